@@ -3,7 +3,7 @@
 PLATFORMS ?= linux-x64
 PYTEST = -P -m pytest
 TRAINED = .venv-training/bin/python -m beyond_mocap
-WEIGHTS = beyond_mocap/synthesis/phase_network/weights
+WEIGHTS = beyond_mocap/throws/networks/weights
 REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help

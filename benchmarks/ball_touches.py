@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.ball.tracked.planted import planted_match
-from beyond_mocap.ball.tracked.planted_feed import Feed, sampled
+from beyond_mocap.synthetic.ground_truth.planted import planted_match
+from beyond_mocap.synthetic.ground_truth.planted_feed import Feed, sampled
 from beyond_mocap.ball.tracked.solve import SolvedBall
-from beyond_mocap.files.tracking import Match, MatchPlayer, read_match
-from beyond_mocap.solve_ball import solve_ball
+from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
+from beyond_mocap.ball.solve_ball import solve_ball
 
 from benchmarks import effort
 from benchmarks.markdown import head, row

@@ -21,10 +21,10 @@ from beyond_mocap.library.library import Library
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
-from beyond_mocap.plan import Plan
-from beyond_mocap.resynthesize import resynthesize
-from beyond_mocap.synthesize import synthesize
-from beyond_mocap.take import Take
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resynthesize import resynthesize
+from beyond_mocap.synthesis.synthesize import synthesize
+from beyond_mocap.synthesis.take import Take
 
 LATER, ASIDE, WIDTH = 0.2, 0.5, 1.5
 TARGET = 0.3

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.files import bvh
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build
 
 from .places import DATA, LIBRARIES, ROOT, scenario_files

@@ -7,14 +7,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from beyond_mocap.files import bvh
-from beyond_mocap.files.marker_set_text import chosen_set
-from beyond_mocap.markers.clean import clean
-from beyond_mocap.markers.planted import Planted, planted
-from beyond_mocap.markers.planted_error import PlantedError, planted_error
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.cleaning.clean import clean
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.ground_truth.planted_error import PlantedError, planted_error
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.reconstruct import Reconstruction, ReconstructSettings, reconstruct
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 
 from benchmarks import markdown
 from benchmarks.places import CMU_UNIT, DATA
@@ -219,7 +219,7 @@ def _meets(stretch, known: Planted, fault) -> bool:
 
 def speed_table() -> list[str]:
     """Frames a second of the pose alone, on one core."""
-    from beyond_mocap.markers.pose import solve
+    from beyond_mocap.markers.pose.pose import solve
 
     lines = markdown.head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
     for name, marker_set in TIMED:
@@ -235,7 +235,7 @@ def speed_table() -> list[str]:
 
 def _rate(made: Reconstruction, solve, weights: bool) -> float:
     """Frames a second by the processor's time, the best of two."""
-    from beyond_mocap.markers.pose import PoseSettings
+    from beyond_mocap.markers.pose.pose import PoseSettings
 
     best = np.inf
     for _ in range(2):

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.files.marker_files import read_markers
+from beyond_mocap.markers.files.marker_files import read_markers
 from beyond_mocap.motion import quaternion
-from beyond_mocap.reconstruct import Reconstruction, ReconstructSettings, reconstruct
+from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 
 from benchmarks import markdown
 from benchmarks.places import DATA

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from beyond_mocap.files.marker_set_text import chosen_set
-from beyond_mocap.markers.planted import Planted, planted
-from beyond_mocap.markers.planted_ball import PlantedBall
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.reconstruct import ReconstructSettings, reconstruct
-from beyond_mocap.release import ReleaseSettings, release
+from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
+from beyond_mocap.markers.release.release import ReleaseSettings, release
 
 from benchmarks import markdown
 from benchmarks.markers_real import made

@@ -9,17 +9,17 @@ import tempfile
 
 import numpy as np
 
-from beyond_mocap.files.tracking import Match, read_match
+from beyond_mocap.files.tracking.tracking import Match, read_match
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
 from beyond_mocap.motion.track import clean, sample
-from beyond_mocap.plan import Plan
-from beyond_mocap.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.balance import balanced
-from beyond_mocap.synthesis.path_search import PathSearch
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.search.balance import balanced
+from beyond_mocap.synthesis.search.path_search import PathSearch
+from beyond_mocap.synthesis.search.wanted import build_order
 from beyond_mocap.synthesis.search_library import search_library
-from beyond_mocap.synthesis.wanted import build_order
-from beyond_mocap.synthesize import synthesize
+from beyond_mocap.synthesis.synthesize import synthesize
 
 from benchmarks.effort import seconds
 from benchmarks.markdown import head, row

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.evaluation.path_ride import figures
-from beyond_mocap.files import bvh
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.path_editing.path_ride import figures
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
-from beyond_mocap.polish.path_line import through
-from beyond_mocap.ride import RideSettings, prepare, ride
+from beyond_mocap.path_editing.path_line import through
+from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
 
 from benchmarks import markdown, path_shapes
 from benchmarks.places import CMU_UNIT, DATA

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from beyond_mocap.annotation import Timeline, read_timeline
-from beyond_mocap.files.tracking import read_track_csv
+from beyond_mocap.files.tracking.tracking import read_track_csv
 from beyond_mocap.motion.track import Track, clean
 
 ROOT = Path(__file__).resolve().parent.parent

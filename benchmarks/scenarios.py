@@ -12,8 +12,8 @@ from beyond_mocap.evaluation.judged import judged
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
-from beyond_mocap.plan import Plan
-from beyond_mocap.synthesize import synthesize
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.synthesize import synthesize
 
 from benchmarks import effort, markdown
 from benchmarks.edit_time import edit_times

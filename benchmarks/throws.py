@@ -7,19 +7,19 @@ from functools import lru_cache
 
 import numpy as np
 
-from beyond_mocap.errors import BeyondMocapError
-from beyond_mocap.evaluate_throws import FULL, RAW, evaluate_throws
-from beyond_mocap.motion.adult import adult_skeleton
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.planted_examples import planted
-from beyond_mocap.synthesis.phase_network import phase_function
-from beyond_mocap.synthesis.phase_network.chains import chains_of
-from beyond_mocap.synthesis.phase_network.example import describe, example_of
-from beyond_mocap.synthesis.phase_network.features import widths
-from beyond_mocap.synthesis.phase_network.generate import Options, generate
-from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
-from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
-from beyond_mocap.throw import Order, shipped_model, throw_at
+from beyond_mocap.base.errors import BeyondMocapError
+from beyond_mocap.throws.evaluate_throws import FULL, RAW, evaluate_throws
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.planted_examples import planted
+from beyond_mocap.throws.networks import phase_function
+from beyond_mocap.throws.networks.chains import chains_of
+from beyond_mocap.throws.networks.example import describe, example_of
+from beyond_mocap.throws.networks.features import widths
+from beyond_mocap.throws.networks.generate import Options, generate
+from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
+from beyond_mocap.throws.networks.network import PhaseNetwork
+from beyond_mocap.throws.throw import Order, shipped_model, throw_at
 
 from benchmarks import effort, markdown
 

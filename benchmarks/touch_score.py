@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 
 TOLERANCE = 0.1
 """Seconds; a sample of a 10 Hz feed may lie so far from the true kick."""

@@ -9,7 +9,7 @@ The way through is `import -> library -> annotate -> synthesize -> polish -> bak
 - `library`     what we choose from: clips, words, features, clusters
 - `plan`, `take` what is asked and what came out
 - `synthesis`   how we choose: blocks of frames, dynamic programming, costs
-- `polish`      how it becomes seamless: smoothing, time warp, path, reach
+- `synthesis`   plan, search, construction and edits
 - `evaluation`  how good it is: every figure of the report
 - `synthesize`  the recipe that walks through all rooms once
 

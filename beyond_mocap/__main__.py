@@ -18,13 +18,11 @@ from pathlib import Path
 
 from . import __version__
 from .base.settings.options import add_options, option_values
-from .commands import (
-    learning, matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches,
-)
-from .commands.outputs import Writer, check_outputs, writer_of
-from .commands.told import Told
-from .errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
-from .plan import Plan
+from .cli import learning, matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches
+from .cli.outputs import Writer, check_outputs, writer_of
+from .cli.progress_reporter import Told
+from .base.errors import BeyondMocapError, Cancelled, InputError, NotInLibrary
+from .synthesis.plan import Plan
 
 
 Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
@@ -164,12 +162,12 @@ def summarize(library) -> dict:
 def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`synthesize`: one player, and what was asked to be written about it."""
     from .annotation import read_timeline, validate
-    from .files.pins import read_pins
+    from .synthesis.pins import read_pins
     from .files.tables import write_ball, write_report
     from .synthesis.provenance import write_provenance
-    from .files.tracking import read_track_csv
+    from .files.tracking.tracking import read_track_csv
     from .motion.track import clean
-    from .synthesize import synthesize
+    from .synthesis.synthesize import synthesize
 
     begun = time.perf_counter()
     outputs = (options.out, options.provenance, options.ball, options.report)
@@ -216,7 +214,7 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`mirror`: the same file with left and right exchanged."""
-    from .files import bvh
+    from .files.bvh import bvh
     from .motion.mirror import mirror
 
     check_outputs(options.output)
@@ -234,7 +232,7 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`retarget`: the motion on another skeleton, whose joint names and channels the output has; at its own rate."""
-    from .files import bvh
+    from .files.bvh import bvh
     from .library.one_skeleton import bring_one
 
     check_outputs(options.out, never=(options.input, options.to, options.map))
@@ -257,14 +255,14 @@ def run_evaluate(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`evaluate`: the report of a motion that was written before. `--unit` is the library's where there is one."""
     from .annotation import read_timeline, validate
     from .evaluation.html import html_report
-    from .evaluation.played import played_from_tables
+    from .synthesis.quality.played import played_from_tables
     from .evaluation.plots import require_matplotlib
     from .evaluation.report import evaluate_played
-    from .files import bvh
+    from .files.bvh import bvh
     from .files.tables import read_ball, write_report
     from .synthesis.provenance import read_provenance
     from .files.whole import atomic_write
-    from .files.tracking import read_track_csv
+    from .files.tracking.tracking import read_track_csv
     from .motion.track import clean
 
     inputs = (options.motion, options.track, options.annotations, options.provenance, options.ball)

@@ -10,11 +10,12 @@ from bpy_extras.io_utils import ImportHelper
 
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
-from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import areas, popup, video
-from ..scene.annotating import do, held, name_of, now, type_keys
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..scene.core import areas, popup
+from ..scene.timeline import video
+from ..scene.timeline.annotating import do, held, name_of, now, type_keys
 from ..scene.core import window
-from ..scene.video import drive
+from ..scene.timeline.video import drive
 from .verb import Verb
 
 SPACES = {

@@ -9,15 +9,18 @@ import bpy
 import numpy as np
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.errors import Cancelled, InputError
-from ..beyond_mocap.files import bvh
+from ..beyond_mocap.base.errors import Cancelled, InputError
+from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.library.converted import FOREIGN, is_foreign
 from ..beyond_mocap.library.scan import find_recordings
 from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place
 from ..beyond_mocap.motion.quaternion import about_up, rotate
-from ..scene import action, armature, assets, channels, clip_annotation, clips, export, foreign, recordings
+from ..scene.core import action, channels
+from ..scene.rigs import armature, export
+from ..scene.library import assets, clips, foreign, recordings
+from ..scene.timeline import clip_annotation
 from .verb import BackgroundVerb, ImportVerb, Verb
 
 
@@ -232,7 +235,7 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Read the motions and draw the pictures."""
-        from ..beyond_mocap.files import bvh
+        from ..beyond_mocap.files.bvh import bvh
         from ..beyond_mocap.library.keep_words import read_words
 
         drafts, pictures, total = [], [], len(order.files) + len(order.drafts)

@@ -12,7 +12,7 @@ _registered = []
 def run(arguments: list[str]) -> int:
     """Run one command line; returns its exit status."""
     from ..beyond_mocap.__main__ import main
-    from ..scene.deliver import WRITERS
+    from ..scene.rigs.deliver import WRITERS
     from ..scene.match import child
 
     return main(arguments, WRITERS, f"blender --command {NAME}", child.run)

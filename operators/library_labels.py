@@ -8,10 +8,12 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import clip_annotation, clips, lanes, preferences, proposals, recordings, session
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..scene.timeline import clip_annotation, lanes, proposals
+from ..scene.library import clips, recordings
+from ..scene.core import preferences, session
 from ..scene.core.window import clear_status
-from ..scene.settings import absolute
+from ..scene.core.settings import absolute
 from .annotate import SPACES
 from .library import ClipVerb, FolderVerb
 from .verb import Verb
@@ -282,7 +284,7 @@ of it. What is written there already is overwritten only when you say so"""
 
     def invoke(self, context, event):
         """Ask before words are overwritten."""
-        from ..beyond_mocap.errors import InputError
+        from ..beyond_mocap.base.errors import InputError
         from ..beyond_mocap.library.keep_words import has_words, place
 
         rig = context.object

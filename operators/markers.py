@@ -9,12 +9,12 @@ import bpy
 from bpy.props import EnumProperty, FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
-from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene import linked
+from ..scene.core import linked
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
-from ..scene.settings import as_setting
+from ..scene.core.settings import as_setting
 from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 
 
@@ -66,7 +66,7 @@ set know their segments at once"""
 
     def do(self, context):
         """Read all files, then make the clouds."""
-        from ..beyond_mocap.files.marker_files import read_markers
+        from ..beyond_mocap.markers.files.marker_files import read_markers
 
         paths = self.chosen()
         if not paths:
@@ -118,7 +118,7 @@ _segments: list[tuple[str, str, str]] = []
 def segments(_operator, _context):
     """The segments to choose from; kept, since Blender does not keep the texts itself."""
     if not _segments:
-        from ..beyond_mocap.markers.template import JOINTS
+        from ..beyond_mocap.markers.model.template import JOINTS
 
         _segments.append(("NONE", "None", "No segment carries it"))
         _segments.extend((name, name, f"The body's {name} carries it") for name in JOINTS)
@@ -150,7 +150,7 @@ _sets: list[tuple[str, str, str]] = []
 def shipped(_operator, _context):
     """The marker sets that come along; kept, since Blender does not keep the texts itself."""
     if not _sets:
-        from ..beyond_mocap.files.marker_set_text import shipped_sets
+        from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         _sets.append(("AUTO", "Recognise", "The one that the labels are of"))
         _sets.extend((one.name, one.name.replace("_", " ").title(), one.about) for one in shipped_sets())
@@ -167,7 +167,7 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
 
     def do(self, context):
         """Find it, apply it."""
-        from ..beyond_mocap.files.marker_set_text import shipped_sets
+        from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         thing = self.cloud(context)
         labels = tuple(row.name for row in thing.beyond_mocap_cloud.labels)
@@ -189,7 +189,7 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
 
     def do(self, context):
         """Read it, apply it."""
-        from ..beyond_mocap.files.marker_set_text import read_marker_set
+        from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
         chosen = self.chosen()
         if len(chosen) != 1:
@@ -212,7 +212,7 @@ line"""
 
     def do(self, context):
         """Put it together, write it."""
-        from ..beyond_mocap.files.marker_set_text import marker_set_text
+        from ..beyond_mocap.markers.files.marker_set_text import marker_set_text
 
         path = Path(bpy.path.abspath(self.filepath))
         name = "_".join(path.stem.split()) or sets.OWN
@@ -258,7 +258,7 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
 
     def do(self, context):
         """Read it, keep it with the cloud."""
-        from ..beyond_mocap.files.model_json import read_model
+        from ..beyond_mocap.markers.files.model_json import read_model
 
         chosen = self.chosen()
         if len(chosen) != 1:
@@ -281,7 +281,7 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
 
     def do(self, context):
         """Read it off the text, write it."""
-        from ..beyond_mocap.files.model_json import write_model
+        from ..beyond_mocap.markers.files.model_json import write_model
 
         path = bpy.path.abspath(self.filepath)
         write_model(models.of_cloud(cloud_meant(context)), path)
@@ -306,7 +306,7 @@ named where the others tell. Reconstruct does the same for itself"""
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Clean it."""
-        from ..beyond_mocap.markers.clean import clean
+        from ..beyond_mocap.markers.cleaning.clean import clean
 
         name, trial, clusters = order
         return name, clean(trial, clusters, progress=progress, cancelled=cancelled)
@@ -339,7 +339,7 @@ clip of the library where asked for"""
     @staticmethod
     def work(order, progress, cancelled, _hurry):
         """Reconstruct it."""
-        from ..beyond_mocap.reconstruct import reconstruct
+        from ..beyond_mocap.markers.reconstruct import reconstruct
 
         made = reconstruct(order.trial, order.static, order.model, order.settings, progress, cancelled)
         return order, made
@@ -374,7 +374,7 @@ the timeline"""
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
         """Find it."""
-        from ..beyond_mocap.release import release
+        from ..beyond_mocap.markers.release.release import release
 
         name, trial, motion, settings = order
         progress(0.1, "release")

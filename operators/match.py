@@ -7,12 +7,13 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
-from ..beyond_mocap.errors import InputError
-from ..scene import areas, channels, export, rig, session
+from ..beyond_mocap.base.errors import InputError
+from ..scene.core import areas, channels, session
+from ..scene.rigs import export, rig
 from ..scene.match import cameras, child, load, order, ours, reading, show
 from ..scene.match.settings import active_of, typed
-from ..scene.measure import frames_per_second
-from ..scene.settings import as_setting
+from ..scene.core.measure import frames_per_second
+from ..scene.core.settings import as_setting
 from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85

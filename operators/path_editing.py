@@ -7,11 +7,11 @@ from contextlib import suppress
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
-from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import linked
-from ..scene.measure import units_per_metre
-from ..scene.ride import curve, keep_apart, measure, riders
-from ..scene.ride.settings import choose, meant, riders as riders_in
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..scene.core import linked
+from ..scene.core.measure import units_per_metre
+from ..scene.path_editing import curve, keep_apart, measure, riders
+from ..scene.path_editing.settings import choose, meant, riders as riders_in
 from .verb import Verb
 
 
@@ -166,8 +166,8 @@ as little as it takes. Of two or more selected riders only those give way; other
 
     def do(self, context):
         """Find out, then ask."""
-        from ..beyond_mocap.polish.apart import Limits
-        from ..beyond_mocap.polish.follower import Change
+        from ..beyond_mocap.path_editing.apart import Limits
+        from ..beyond_mocap.path_editing.follower import Change
 
         bodies = meant(context)
         bodies = bodies if len(bodies) > 1 else riders_in(context.scene)

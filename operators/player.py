@@ -7,11 +7,13 @@ from pathlib import Path
 import bpy
 from bpy.props import EnumProperty, StringProperty
 
-from ..beyond_mocap.errors import InputError
-from ..beyond_mocap.files.providers import PROVIDERS
-from ..scene import bake, dots, pins, plans, preview, strip_events, strips, tracks, word_checks
-from ..scene.settings import active_player, as_setting
-from ..scene.subject import show
+from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.files.tracking.providers import PROVIDERS
+from ..scene.result import bake, plans, preview
+from ..scene.player import dots, pins, tracks
+from ..scene.timeline import strip_events, strips, word_checks
+from ..scene.core.settings import active_player, as_setting
+from ..scene.player.subject import show
 from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
@@ -34,7 +36,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     provider: EnumProperty(
         name="Provider",
         items=[("AUTO", "Guess", "By what the file looks like")]
-        + [(name, name.capitalize(), name) for name in PROVIDERS],
+        + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
         description="Whose form the file has",
     )
 

@@ -6,9 +6,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.settings.synthesis import FORMS
-from ..beyond_mocap.errors import InputError
-from ..scene import error_curves, preview, session, variants
-from ..scene.settings import active_player
+from ..beyond_mocap.base.errors import InputError
+from ..scene.result import error_curves, preview, variants
+from ..scene.core import session
+from ..scene.core.settings import active_player
 from .turns import show_automatic
 from .verb import Verb
 

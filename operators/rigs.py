@@ -9,16 +9,18 @@ import numpy as np
 from bpy.props import BoolProperty, EnumProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..beyond_mocap.errors import InputError
-from ..beyond_mocap.files import bvh
-from ..scene import action, bake, bone_maps, channels, export, rig, rig_bake, rig_copy, session
-from ..scene.measure import frames_per_second
-from ..scene.ride import riders
+from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.files.bvh import bvh
+from ..scene.core import action, channels, session
+from ..scene.result import bake
+from ..scene.rigs import bone_maps, export, rig, rig_bake, rig_copy
+from ..scene.core.measure import frames_per_second
+from ..scene.path_editing import riders
 from ..scene.rigs import bake_record
 from ..scene.rigs.driven import Driven, check
 from ..scene.rigs.fit import BakeOptions
 from ..scene.rigs.source import source_of
-from ..scene.settings import active_player
+from ..scene.core.settings import active_player
 from .verb import ExportVerb, Verb
 
 
@@ -283,7 +285,7 @@ def table_for(settings, target: bpy.types.Object) -> dict[str, str]:
 
 def reduced(target: bpy.types.Object, table: dict[str, str], settings) -> str:
     """Leave out keys, and a line about it."""
-    from ..scene import key_reduction
+    from ..scene.rigs import key_reduction
 
     before, after = key_reduction.reduce(target, table, bpy.context.scene, settings.tolerance, settings.turn_tolerance)
     return f"keys: {after} of {before} left"

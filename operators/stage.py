@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty
 
-from ..beyond_mocap.errors import InputError
-from ..scene import areas, path_cameras, stage
-from ..scene.ride.settings import meant, riders
+from ..beyond_mocap.base.errors import InputError
+from ..scene.core import areas
+from ..scene.stage import path_cameras, stage
+from ..scene.path_editing.settings import meant, riders
 from .verb import Verb
 
 

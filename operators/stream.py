@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.errors import InputError
-from ..beyond_mocap.stream.live_hits import recorded
+from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.passes.stream.live_hits import recorded
 from ..scene.passes import make
 from ..scene.passes.settings import subject
 from ..scene.stream import follow, play, receiver, streamed

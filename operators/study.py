@@ -8,13 +8,13 @@ from pathlib import Path
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.errors import InputError
-from ..beyond_mocap.files import bvh
+from ..beyond_mocap.base.errors import InputError
+from ..beyond_mocap.files.bvh import bvh
 from ..beyond_mocap.files.tables import read_ball
 from ..beyond_mocap.files.whole import beside
 from ..beyond_mocap.study.form import MOVIES, clip_source
 from ..beyond_mocap.study.study_file import read_study
-from ..scene import study as filming
+from ..scene.study import study as filming
 from .verb import Verb
 
 CLIPS = "clips"

@@ -6,10 +6,11 @@ import bpy
 from bl_operators.presets import AddPresetBase
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import rows_of
-from ..scene import background, freshness, orders, queue, session, stretch
-from ..scene.settings import active_player
+from ..scene.core import background, session
+from ..scene.result import freshness, orders, queue, stretch
+from ..scene.core.settings import active_player
 from .turns import TurnsVerb
 
 
@@ -17,7 +18,7 @@ class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
     """Find clips for every ticked player's track and words, and join them into one motion.
 It is shown as a preview, until it is accepted or discarded. Players queue; ESC cancels"""
 
-    bl_idname = "beyond_mocap.synthesize"
+    bl_idname = "beyond_mocap.synthesis.synthesize"
     bl_label = "Synthesize"
 
 

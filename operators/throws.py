@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..beyond_mocap.errors import InputError
+from ..beyond_mocap.base.errors import InputError
 from ..scene.throws import made, order, shown
 from ..scene.throws.settings import thrower
 from .verb import BackgroundVerb, Verb

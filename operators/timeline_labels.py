@@ -9,11 +9,14 @@ from bpy.props import FloatProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
-from ..beyond_mocap.errors import InputError
-from ..scene import clip_annotation, lanes, lay_strips, plans, recordings, strips, tracks
-from ..scene.settings import active_player, as_setting
-from ..scene.strip_lines import said, words_of
-from ..scene.subject import clip, clock, name_of, subject, with_lanes
+from ..beyond_mocap.base.errors import InputError
+from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
+from ..scene.result import plans
+from ..scene.library import recordings
+from ..scene.player import tracks
+from ..scene.core.settings import active_player, as_setting
+from ..scene.timeline.strip_lines import said, words_of
+from ..scene.player.subject import clip, clock, name_of, subject, with_lanes
 from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
 from .verb import ImportVerb, Verb
 

@@ -8,8 +8,9 @@ import bpy
 from bpy.props import CollectionProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..beyond_mocap.errors import BeyondMocapError, InputError
-from ..scene import background, export
+from ..beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..scene.core import background
+from ..scene.rigs import export
 from ..scene.core import window
 
 

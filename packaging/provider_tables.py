@@ -1,4 +1,4 @@
-"""Writes the tables of providers in docs/match-input.md from their records: python packaging/provider_tables.py"""
+"""Writes the tables of providers in docs/match/match-input.md from their records: python packaging/provider_tables.py"""
 
 import pathlib
 import re
@@ -10,8 +10,8 @@ PAGE = TOP / "docs" / "match-input.md"
 
 def with_tables(text):
     """The page with the rows of both tables, in their order, as the records have them."""
-    from beyond_mocap.files.event_providers import EVENT_PROVIDERS
-    from beyond_mocap.files.providers import PROVIDERS
+    from beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
+    from beyond_mocap.files.tracking.providers import PROVIDERS
 
     tables = iter((PROVIDERS, EVENT_PROVIDERS))
 

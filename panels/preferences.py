@@ -9,7 +9,7 @@ from __future__ import annotations
 import bpy
 import rna_keymap_ui
 
-from ..scene.preferences import EXTENSION, Preferences
+from ..scene.core.preferences import EXTENSION, Preferences
 
 
 def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.settings import active_player
+from ..scene.core.settings import active_player
 from .tab import Step
 
 ICONS = {

@@ -83,8 +83,8 @@ def prepare(bpy) -> None:
 
 def synthesize(load, settings, steps) -> list[dict]:
     """Library and takes, kept for Accept; returns the players' reports."""
-    plans, session = load("scene.plans"), load("scene.session")
-    quality, recipe = load("scene.quality"), load("beyond_mocap.synthesize")
+    plans, session = load("scene.result.plans"), load("scene.core.session")
+    quality, recipe = load("scene.result.quality"), load("beyond_mocap.synthesis.synthesize")
     steps.enter("Library")
     begun = time.perf_counter()
     clips = load("beyond_mocap.library.build").build(settings.library_folder, progress=steps.progress)
@@ -148,7 +148,7 @@ def render(bpy, load, plans, takes, out: pathlib.Path, steps) -> None:
     """The sheet of rendered frames: Cycles on the CPU, which needs no graphics card and no window."""
     import numpy as np
 
-    scene, frame_at = bpy.context.scene, load("scene.bake").frame_at
+    scene, frame_at = bpy.context.scene, load("scene.result.bake").frame_at
     following, scene.camera = scene.camera, close_camera(bpy)
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = 12, False, 2
@@ -235,14 +235,14 @@ def run(out: pathlib.Path) -> None:
     )
     with quiet():
         prepare(bpy)
-    settings, session = bpy.context.scene.beyond_mocap, load("scene.session")
+    settings, session = bpy.context.scene.beyond_mocap, load("scene.core.session")
     reports = synthesize(load, settings, steps)
     steps.enter("Accept")
     made = [session.made(player.take) for player in settings.players]
     plans, takes = [one.plan for one in made], [one.take for one in made]
     with quiet():
         bpy.ops.beyond_mocap.accept()
-    load("beyond_mocap.files.bvh").write(out / "player.bvh", takes[0].motion)
+    load("beyond_mocap.files.bvh.bvh").write(out / "player.bvh", takes[0].motion)
     others = dict(zip([player.name for player in settings.players][1:], reports[1:]))
     load("beyond_mocap.files.tables").write_report(out / "report.json", {**reports[0], "others": others})
     steps.enter("Render")

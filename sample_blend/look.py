@@ -19,11 +19,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
-from beyond_mocap.errors import InputError  # noqa: E402
-from beyond_mocap.files import bvh  # noqa: E402
+from beyond_mocap.base.errors import InputError  # noqa: E402
+from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball  # noqa: E402
 from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
-from beyond_mocap.motion.body import deformed, low_poly_body  # noqa: E402
+from beyond_mocap.appearance.body import deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
 
 COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)

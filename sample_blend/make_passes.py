@@ -18,8 +18,8 @@ if __name__ == "__main__":
 from make_sample import FPS, Clip, clips, words_of  # noqa: E402
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
-from beyond_mocap.files import bvh  # noqa: E402
-from beyond_mocap.motion.volleys import VOLLEYS, idle, volley  # noqa: E402
+from beyond_mocap.files.bvh import bvh  # noqa: E402
+from beyond_mocap.synthetic.volleys import VOLLEYS, idle, volley  # noqa: E402
 
 TAKEN = (
     "standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6",
@@ -36,7 +36,7 @@ STRIKES = (
     ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0), ("head", "head", 1.25),
     ("chest", "chest", 1.0), ("hand", "hand", 1.3), ("racquet", "racquet", 1.0), ("racquet_slow", "racquet", 0.8),
 )  # fmt: skip
-"""Name, kind (`motion.volleys`) and speed of every strike."""
+"""Name, kind (`synthetic.volleys`) and speed of every strike."""
 
 
 def library() -> list[Clip]:

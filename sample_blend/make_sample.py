@@ -2,7 +2,7 @@
 
     python sample_blend/make_sample.py [FOLDER]
 
-Everything is computed from `beyond_mocap.motion.gait` and `gestures`; the same code gives the same bytes. Needs the
+Everything is computed from `beyond_mocap.synthetic.gait` and `gestures`; the same code gives the same bytes. Needs the
 core only."""
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ if __name__ == "__main__":
 from beyond_mocap.base.time_series import hann_smooth, interpolate  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
-from beyond_mocap.files import bvh  # noqa: E402
-from beyond_mocap.motion.gait import gait  # noqa: E402
-from beyond_mocap.motion.gestures import Gesture, dribble, strike  # noqa: E402
+from beyond_mocap.files.bvh import bvh  # noqa: E402
+from beyond_mocap.synthetic.gait import gait  # noqa: E402
+from beyond_mocap.synthetic.gestures import Gesture, dribble, strike  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402
-from beyond_mocap.motion.runs import equal_runs  # noqa: E402
-from beyond_mocap.motion.moves import celebration, getting_up, header, throw_in  # noqa: E402
+from beyond_mocap.base.runs import equal_runs  # noqa: E402
+from beyond_mocap.synthetic.moves import celebration, getting_up, header, throw_in  # noqa: E402
 
 FPS = 30.0
 # speeds (m/s) at which one gait's word ends and the next begins, as in Faustino's data

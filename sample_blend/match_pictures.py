@@ -1,4 +1,4 @@
-"""Renders the pictures of docs/match-panel.md: the small match, from the stand and through a player's eyes.
+"""Renders the pictures of docs/match/match-panel.md: the small match, from the stand and through a player's eyes.
 
     .venv/bin/python sample_blend/match_pictures.py [FOLDER]
 

@@ -37,8 +37,9 @@
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 """
 
-from . import session
+from .core import session
 from .core import registration
+from .core.live import start_watching, stop_watching
 from .markers import kept
 from .match import child
 
@@ -46,10 +47,12 @@ from .match import child
 def register():
     """Register the data classes, attach them to Blender's own data, and begin to watch."""
     registration.register_package(__name__)
+    start_watching()
 
 
 def unregister():
     """End what runs, undo what was registered, and forget what was kept in memory."""
+    stop_watching()
     child.end_all()
     registration.unregister_package(__name__)
     session.clear()

@@ -1,7 +1,7 @@
-"""Training of the networks behind throws and kicks; see docs/throws-training.md.
+"""Training of the networks behind throws and kicks; see docs/throws/throws-training.md.
 
 Not part of the extension: it needs jax and optax (`make training`). What it makes is a file of weights that
-`beyond_mocap.synthesis.phase_network` uses with numpy alone.
+`beyond_mocap.throws.networks` uses with numpy alone.
 """
 
 import os

@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from beyond_mocap.commands.outputs import check_outputs
-from beyond_mocap.commands.told import Told
-from beyond_mocap.errors import InputError
-from beyond_mocap.files import bvh
-from beyond_mocap.files.network_npz import write_model
+from beyond_mocap.cli.outputs import check_outputs
+from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.motion.skeleton import Skeleton
-from beyond_mocap.synthesis.phase_network.chains import chains_of
-from beyond_mocap.synthesis.phase_network.example import Example
-from beyond_mocap.throw_examples import examples_in
+from beyond_mocap.throws.networks.chains import chains_of
+from beyond_mocap.throws.networks.example import Example
+from beyond_mocap.throws.throw_examples import examples_in
 
 from . import checkpoint
 from .config import TrainingConfig, read_config

@@ -1,5 +1,5 @@
 """What a training is told: the sizes of the networks and how they are trained; read from a small JSON
-(docs/throws-training.md has a table of all names)."""
+(docs/throws/throws-training.md has a table of all names)."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import os
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.files import json_values as values
 from beyond_mocap.files.content import utf8
-from beyond_mocap.synthesis.phase_network.model import ModelSettings
+from beyond_mocap.throws.networks.model import ModelSettings
 
-PAGE = "docs/throws-training.md"
+PAGE = "docs/throws/throws-training.md"
 LARGEST = 1_000_000
 """Bytes of a file above which it is no config."""
 LIMITS = {

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 
 from beyond_mocap.base.vectors import skew_matrix
-from beyond_mocap.synthesis.phase_network.chains import Chains
-from beyond_mocap.synthesis.phase_network.kinematics import Pose, places_and_turns
+from beyond_mocap.throws.networks.chains import Chains
+from beyond_mocap.throws.networks.kinematics import Pose, places_and_turns
 
 FACING = 5.0
 """Radians by which a whole body is turned about the upright, for each radian of its joints."""

@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 import optax
 
-from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.base.errors import Cancelled, InputError
 
 from . import checkpoint as kept
 from .config import TrainingConfig

@@ -9,18 +9,18 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.synthesis.phase_network import phase_function
-from beyond_mocap.synthesis.phase_network.answers import answered, ends, network_output
-from beyond_mocap.synthesis.phase_network.chains import LIMB_OF, Chains
-from beyond_mocap.synthesis.phase_network.description import Windows
-from beyond_mocap.synthesis.phase_network.features import guides, network_input, phase_of
-from beyond_mocap.synthesis.phase_network.kinematics import Pose
-from beyond_mocap.synthesis.phase_network.limb_reach import bent_limb, hinge_axes
-from beyond_mocap.synthesis.phase_network.limits import JointLimits
-from beyond_mocap.synthesis.phase_network.model import SINGLE, ModelSettings
-from beyond_mocap.synthesis.phase_network.network import forward
-from beyond_mocap.synthesis.phase_network.training_set import Steps
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.throws.networks import phase_function
+from beyond_mocap.throws.networks.answers import answered, ends, network_output
+from beyond_mocap.throws.networks.chains import LIMB_OF, Chains
+from beyond_mocap.throws.networks.description import Windows
+from beyond_mocap.throws.networks.features import guides, network_input, phase_of
+from beyond_mocap.throws.networks.kinematics import Pose
+from beyond_mocap.throws.networks.limb_reach import bent_limb, hinge_axes
+from beyond_mocap.throws.networks.limits import JointLimits
+from beyond_mocap.throws.networks.model import SINGLE, ModelSettings
+from beyond_mocap.throws.networks.network import forward
+from beyond_mocap.throws.networks.training_set import Steps
 
 from .arrays import ARRAYS
 from .config import TrainingConfig

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
+from beyond_mocap.throws.networks.network import PhaseNetwork
 
 SMALLEST_SCALE = 1e-3
 """Values that hardly change in training are divided by no less than this, so that use does not blow them up."""

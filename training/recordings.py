@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from beyond_mocap.base.digest import hex_digest
-from beyond_mocap.errors import InputError
-from beyond_mocap.synthesis.phase_network.answers import network_output
-from beyond_mocap.synthesis.phase_network.chains import Chains
-from beyond_mocap.synthesis.phase_network.description import Windows, windows
-from beyond_mocap.synthesis.phase_network.example import Example, describe, poses
-from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
-from beyond_mocap.synthesis.phase_network.kinematics import Pose
-from beyond_mocap.synthesis.phase_network.model import ModelSettings
-from beyond_mocap.synthesis.phase_network.training_set import Steps
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.throws.networks.answers import network_output
+from beyond_mocap.throws.networks.chains import Chains
+from beyond_mocap.throws.networks.description import Windows, windows
+from beyond_mocap.throws.networks.example import Example, describe, poses
+from beyond_mocap.throws.networks.features import network_input, phase_of
+from beyond_mocap.throws.networks.kinematics import Pose
+from beyond_mocap.throws.networks.model import ModelSettings
+from beyond_mocap.throws.networks.training_set import Steps
 
 
 class Recordings(NamedTuple):

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 import jax
 import numpy as np
 
-from beyond_mocap.errors import Cancelled, InputError
-from beyond_mocap.synthesis.phase_network.example import Example, describe
-from beyond_mocap.synthesis.phase_network.generate import Options, generate
-from beyond_mocap.synthesis.phase_network.model import ThrowModel
+from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.throws.networks.example import Example, describe
+from beyond_mocap.throws.networks.generate import Options, generate
+from beyond_mocap.throws.networks.model import ThrowModel
 
 from .hierarchy import Networks
 from .networks import RIDGES

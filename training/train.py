@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.synthesis.phase_network.example import Example
-from beyond_mocap.synthesis.phase_network.limits import JointLimits, learn
-from beyond_mocap.synthesis.phase_network.model import ThrowModel
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, reference_of, shared_chains, with_mirrors
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.throws.networks.example import Example
+from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.model import ThrowModel
+from beyond_mocap.throws.networks.training_set import leg_reach, reference_of, shared_chains, with_mirrors
 
 from .config import TrainingConfig
 from .fit import Trained, fit

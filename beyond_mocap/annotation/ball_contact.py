@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..motion.skeleton import Skeleton
-from ..motion.striking import Surface, part_surfaces, smallest_gap
+from .striking import Surface, part_surfaces, smallest_gap
 from .labels import find_label, list_labels, read_labels
 from .vocabulary import SIDES
 
@@ -87,5 +87,5 @@ def contact_gap(
     skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, words: Iterable[str], ball: np.ndarray
 ) -> np.ndarray:
     """The smallest gap (...,) m of the surfaces that may meet the ball by these words, NaN without any; see
-    `motion.striking.smallest_gap`, which says what the arrays are."""
+    `annotation.striking.smallest_gap`, which says what the arrays are."""
     return smallest_gap(surfaces(skeleton, words), positions, rotations, ball)

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .text import parse_timeline, read_text
 from .timeline import KeyMoment, Span, Timeline
 from .vocabulary import DISCRETE, TRANSITION

@@ -9,8 +9,8 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError
-from ..motion.striking import BODY_PARTS
+from ..base.errors import InputError
+from .striking import BODY_PARTS
 from .labels import list_labels
 from .text import read_text
 from .timeline import checked_words
@@ -48,7 +48,7 @@ TABLE = Path(__file__).with_name("event_words.csv")
 """The table that comes with us."""
 
 _COLUMNS = ("kind", "part", "detail", "words")
-_STEP = "see docs/match-input.md"
+_STEP = "see docs/match/match-input.md"
 
 
 @dataclass(frozen=True)

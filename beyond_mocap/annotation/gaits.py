@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import InputError
-from ..motion.runs import equal_runs
+from ..base.errors import InputError
+from ..base.runs import equal_runs
 from .labels import list_gaits, list_labels
 
 LOCOMOTION = list_gaits()

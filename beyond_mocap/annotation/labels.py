@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from ..errors import InputError
-from ..motion.striking import BODY_PARTS
+from ..base.errors import InputError
+from .striking import BODY_PARTS
 
 TABLE = Path(__file__).with_name("vocabulary.csv")
 

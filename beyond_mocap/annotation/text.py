@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..errors import InputError, told_time
+from ..base.errors import InputError, told_time
 from .timeline import LONGEST_TIME, MUST_NOT, NUMBER, KeyMoment, Span, Timeline, spelled
 
 _FORM = "'START END words...' or 'TIME words...'"

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError, told_time
+from ..base.errors import InputError, told_time
 from .vocabulary import CONTINUOUS, DISCRETE, TRANSITION, nearest, similar_words, vocabulary_words, words_below
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?f?", re.IGNORECASE)

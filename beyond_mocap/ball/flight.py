@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..motion import quaternion
 from .physics import Ball, bounced, gripped, in_air, length, rolling_spin, sliding, slip, slowing
 

@@ -58,3 +58,16 @@ def hermite(share: np.ndarray, start, start_slope, end, end_slope) -> np.ndarray
         (2 * s3 - 3 * s2 + 1) * start + (s3 - 2 * s2 + share) * start_slope
         + (3 * s2 - 2 * s3) * end + (s3 - s2) * end_slope
     )  # fmt: skip
+State = tuple[float, np.ndarray, np.ndarray]
+"""A second, a place (2,) m and a velocity (2,) m/s."""
+
+
+def quintic_between(times: np.ndarray, before: State, after: State) -> np.ndarray:
+    """(N, 2) m: the quintic from one state to the other without acceleration at either end."""
+    (start, place, leaves), (end, goal, comes) = before, after
+    length = max(end - start, 1e-9)
+    x = ((np.asarray(times) - start) / length)[:, None]
+    h = goal - place
+    a, b = length * leaves, length * comes
+    third, fourth, fifth = 10 * h - 6 * a - 4 * b, -15 * h + 8 * a + 7 * b, 6 * h - 3 * a - 3 * b
+    return place + a * x + third * x**3 + fourth * x**4 + fifth * x**5

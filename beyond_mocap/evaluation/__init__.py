@@ -20,19 +20,3 @@
 Functions in the upper half take plain arrays. Speed classes are 0-1, 1-2, 2-3, 3-4.5 m/s and above; an *own score* is
 the same figure on the uncut source clips, at the output's rate, over the frames that were used.
 """
-
-from .played import Played, played_from_tables, played_from_take
-from .reference import LibraryReference, library_reference
-from .report import evaluate, evaluate_played, rounded, table
-
-__all__ = [
-    "LibraryReference",
-    "Played",
-    "evaluate",
-    "evaluate_played",
-    "library_reference",
-    "played_from_tables",
-    "played_from_take",
-    "rounded",
-    "table",
-]

@@ -8,14 +8,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..annotation import Timeline, automatic_gaits, fill, words_per_frame
-from ..errors import InputError
+from ..base.errors import InputError
 from ..library.automatic import automatic_words
 from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
-from . import feet, jerk, pieces, realism, root, words
-from .give_way import give_way, jolts
-from .moments import Moment, ball_gap, ball_shift, met, with_made
+from ..synthesis.quality import feet, jerk, pieces, root
+from . import realism, words
+from ..synthesis.quality.give_way import give_way, jolts
+from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
 from .reference import source_poses
 from .view import View
 

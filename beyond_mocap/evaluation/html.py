@@ -15,13 +15,14 @@ import numpy as np
 from ..annotation import Timeline
 from ..library.library import Library
 from ..motion.track import Track
-from . import jerk, plots
-from .feet import contact_speeds
+from ..synthesis.quality import jerk
+from . import plots
+from ..synthesis.quality.feet import contact_speeds
 from .html_page import (
     Html, build_image, build_list, build_page, build_row, build_section, build_table, build_title, element, fragment,
 )
 from .judged import judged
-from .played import Played
+from ..synthesis.quality.played import Played
 from .view import View
 
 MOST_MOMENTS = 12

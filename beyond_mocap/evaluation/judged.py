@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from .report import flat
-from .targets import target_of
+from ..synthesis.quality.targets import target_of
 
 
 class Row(NamedTuple):

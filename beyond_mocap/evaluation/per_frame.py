@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.ball_contact import surfaces
-from ..motion.striking import faster_middle, nearest_on
-from . import feet, jerk, root
-from .moments import Moment, met, touching_words, written_ball
+from ..annotation.striking import faster_middle, nearest_on
+from ..synthesis.quality import feet, jerk, root
+from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
 from .view import View
 
 

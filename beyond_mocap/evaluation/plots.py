@@ -10,13 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate
-from ..motion.runs import runs
+from ..base.runs import runs
 from ..motion.track import BALL_RADIUS
-from . import figures, pieces, realism, root
+from . import figures, realism
+from ..synthesis.quality import pieces, root
 from .view import View
 
 WIDTH = 11.0

@@ -16,12 +16,13 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..annotation.gaits import STANDING
-from ..errors import InputError
+from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.library import Library
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
-from . import feet, jerk, realism, root
+from ..synthesis.quality import feet, jerk, root
+from . import realism
 
 POSES_PER_SECOND = 10.0
 LEFT_OUT_POSES = 3000

@@ -8,13 +8,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..annotation import Timeline
-from ..errors import InputError, spans_of
+from ..base.errors import InputError, spans_of
 from ..library.library import Library
 from ..motion.track import Track
-from ..take import Take
+from ..synthesis.take import Take
 from . import figures
-from .moments import dribble_touches
-from .played import Played, played_from_take
+from ..synthesis.quality.moments import dribble_touches
+from ..synthesis.quality.played import Played, played_from_take
 from .view import View
 
 VERSION = 1

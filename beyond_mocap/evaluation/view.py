@@ -6,14 +6,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..annotation import Timeline
-from ..errors import InputError
+from ..base.errors import InputError
 from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.skeleton import Skeleton
 from ..motion.track import Track
-from . import pieces, root
-from .moments import moments
-from .played import Played
+from ..synthesis.quality import pieces, root
+from ..synthesis.quality.moments import moments
+from ..synthesis.quality.played import Played
 from .reference import library_reference
 
 

@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 from typing import BinaryIO
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 def opened(path: str | os.PathLike, kind: str, largest: int | None = None) -> BinaryIO:

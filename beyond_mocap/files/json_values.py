@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 def object_of(said: str, name: str, page: str):

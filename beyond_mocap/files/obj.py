@@ -11,7 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from .content import content
 
 _FARTHEST = 1e5  # metres

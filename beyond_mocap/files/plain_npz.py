@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 HEADER = "header"
 """Name of the array that holds a text, as bytes of UTF-8."""

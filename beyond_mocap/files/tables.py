@@ -16,7 +16,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..motion.skeleton import frozen_array
 from ..motion.track.ball_path import BallPath
 from .content import content

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 @contextlib.contextmanager

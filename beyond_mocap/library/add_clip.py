@@ -8,8 +8,8 @@ from pathlib import Path
 from ..annotation import ClipAnnotation
 from ..annotation.timeline import checked_words
 from ..annotation.vocabulary import vocabulary_words
-from ..errors import InputError
-from ..files import bvh
+from ..base.errors import InputError
+from ..files.bvh import bvh
 from ..motion.motion import Motion
 from .keep_words import has_words, keep
 

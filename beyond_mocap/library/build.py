@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Callable, Iterable
 
 from ..annotation import ClipAnnotation
-from ..errors import Cancelled, InputError
-from ..files import bvh
-from ..motion.landing import ends_in_flight
+from ..base.errors import Cancelled, InputError
+from ..files.bvh import bvh
+from ..synthetic.landing import ends_in_flight
 from ..motion.motion import Motion
 from . import cache, landings, one_skeleton, repair
 from .clip import Clip

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..base.digest import byte_digest
-from ..errors import InputError
+from ..base.errors import InputError
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clip import Clip

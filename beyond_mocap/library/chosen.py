@@ -13,7 +13,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION
-from ..errors import InputError
+from ..base.errors import InputError
 from .clip import Clip
 from .library import Library, gait_word
 

@@ -12,7 +12,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..files.whole import atomic_write
 
 FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, read_annotation_csv
 from ..annotation.text import read_text
-from ..errors import InputError
+from ..base.errors import InputError
 from ..files.whole import atomic_write
 from .scan import TABLE_NAME, Annotations
 from .word_sources import Sources, cells, comment, sources_in_table, sources_in_text

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
-from ..motion.landing import ends_in_flight, landed
+from ..synthetic.landing import ends_in_flight, landed
 from ..motion.motion import Motion
-from ..motion.moves import getting_up
+from ..synthetic.moves import getting_up
 from .scan import CACHE_FOLDER
 
 LANDING_FOLDER = f"{CACHE_FOLDER}/made-landing/"

@@ -14,7 +14,7 @@ from typing import Callable
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds
-from ..errors import InputError
+from ..base.errors import InputError
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS
 from ..motion.skeleton import Skeleton

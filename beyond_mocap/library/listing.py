@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import ClipAnnotation, spoken
-from ..errors import InputError
+from ..base.errors import InputError
 from . import cache
 from .converted import Conversions, is_foreign
 from .clip import Clip

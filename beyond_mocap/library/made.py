@@ -9,13 +9,13 @@ and a run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a 
 shuffling jog, with flight coming in gradually (7 % at 1.7 m/s, 32 % at 2.3 m/s), in the actors' own style, and closer
 to their poses than a made walk or jog.
 
-Above the recordings `motion.gait` makes running at any speed from published figures, with the skeleton's own upright
+Above the recordings `synthetic.gait` makes running at any speed from published figures, with the skeleton's own upright
 stance and the recorded runners' elbows and lean: long runs that slowly gain and lose speed, so that few cuts are
 needed, quick ones, and weaving ones. The fastest recording played faster with stretched strides would keep the
 figures and lose the look: knees pop, the body floats.
 
 Recorded kicks are seldom faster than a jog, and who takes a ball with his foot in a recording all but stands; carried
-along at 8 m/s their standing foot slides by metres. `motion.gestures` makes both on the run at the speeds they lack;
+along at 8 m/s their standing foot slides by metres. `synthetic.gestures` makes both on the run at the speeds they lack;
 they stand in for recorded ones wherever they carry the words by which those answer.
 """
 
@@ -29,15 +29,16 @@ import numpy as np
 from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
 from ..base.vectors import cross
 from ..annotation import LOCOMOTION
-from ..motion import contacts, gestures, quaternion
-from ..motion.arctangent import arctan2
-from ..motion.course import GaitStyle
-from ..motion.gait import gait
+from ..motion import contacts, quaternion
+from ..synthetic import gestures
+from ..base.arctangent import arctan2
+from ..synthetic.course import GaitStyle
+from ..synthetic.gait import gait
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
-from ..motion.runs import equal_runs, runs
-from ..polish.foot_plant import plant
+from ..base.runs import equal_runs, runs
+from ..motion.foot_plant import plant
 from .features import Frames
 from .scan import CACHE_FOLDER
 
@@ -133,7 +134,7 @@ def made_clips(
 
 
 def upright_example(clips: Sequence) -> Motion:
-    """Frames of all recordings, one a second: `motion.neutral` takes the most upright of them for the way this skeleton
+    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way this skeleton
     stands. A single recording of a run leans, and made running would lean twice."""
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..motion import contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion
-from ..motion.retarget import Retargeter
+from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from . import repair
 
@@ -55,7 +55,7 @@ def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | P
     """`motion` on the skeleton of `target`, a recording or a pose of it, feet held where they stood; its rate and
     floor.
 
-    bone_map: see `motion.retarget`. On its own skeleton a motion stays as it is. Raises InputError as there.
+    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as there.
     """
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(

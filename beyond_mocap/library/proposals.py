@@ -25,11 +25,11 @@ from ..annotation.gaits import STANDING, without_short_runs
 from ..annotation.labels import find_label
 from ..annotation.vocabulary import DIRECTIONS
 from ..motion import contacts, quaternion
-from ..motion.arctangent import arctan2
+from ..base.arctangent import arctan2
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.runs import equal_runs, runs
-from ..motion.striking import part_surfaces
+from ..base.runs import equal_runs, runs
+from ..annotation.striking import part_surfaces
 from .library import Library
 from .proposal import Proposal
 

@@ -25,9 +25,9 @@ from ..base.banded_least_squares import BandedLeastSquares
 from ..motion import contacts, quaternion
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
-from ..motion.runs import runs
+from ..base.runs import runs
 from ..motion.track import zero_phase_hann
-from ..polish.foot_plant import plant
+from ..motion.foot_plant import plant
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
-from ..errors import InputError
+from ..base.errors import InputError
 from .converted import FOREIGN, Conversions, is_foreign, told
 
 CACHE_FOLDER = ".beyond_mocap"

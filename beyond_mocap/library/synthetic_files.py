@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Iterable
 
-from ..files import bvh
+from ..files.bvh import bvh
 from .clip import Clip
 from .scan import CACHE_FOLDER
 

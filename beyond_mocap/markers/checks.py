@@ -13,10 +13,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..errors import InputError, TimedLine
-from ..motion.runs import runs
-from .marker_set import UNLABELED
-from .model import MarkerModel
+from ..base.errors import InputError, TimedLine
+from ..base.runs import runs
+from .model.marker_set import UNLABELED
+from .model.model import MarkerModel
 from .trial import MarkerTrial
 from .upright import handedness
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .model import MarkerModel
-from .residuals import seen_markers
+from .model.model import MarkerModel
+from .pose.residuals import seen_markers
 from .trial import MarkerTrial
 
 OVER_SOLE = 0.03

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .marker_set import UNLABELED, MarkerSet
+from .model.marker_set import UNLABELED, MarkerSet
 from .trial import MarkerTrial
 
 

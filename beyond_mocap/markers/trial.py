@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 
 FEWEST_FPS, MOST_FPS = 1.0, 20000.0
 

@@ -13,26 +13,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..library.chosen import with_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
-from ..plan import Plan
-from ..polish.hand_over import handed_over
-from ..polish.meeting import eased
-from ..synthesis.edit_list import EditList, at_times
-from ..synthesis.footage import shown
-from ..resolve_plan import resolve_plan
-from ..synthesize import constructed
+from ..synthesis.plan import Plan
+from ..synthesis.construct.hand_over import handed_over
+from ..synthesis.construct.ball.meeting import eased
+from ..synthesis.search.edit_list import EditList, at_times
+from ..synthesis.search.footage import shown
+from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.synthesize import constructed
 from ..motion.track.ball_path import BallPath
-from ..take import Take
-from .cut_plan import cut_plan
+from ..synthesis.take import Take
+from .pieces.cut_plan import cut_plan
 from .joined_takes import one_take, own_part
-from .library_clips import bound
-from .named_edit import part
+from .pieces.library_clips import bound
+from .pieces.named_edit import part
 from .player_edit import PlayerEdit, Stretch
-from .units import frame_count, layout_edges
+from .pieces.units import frame_count, layout_edges
 
 AROUND = 4.0
 """Seconds on either side of a window that are laid out too."""

@@ -19,11 +19,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..files.content import content
 from ..files.tables import plain
 from ..files.whole import atomic_write
-from .content_digest import digest_of
+from .pieces.content_digest import digest_of
 
 STATE = "match.json"
 WORDS = "annotations"

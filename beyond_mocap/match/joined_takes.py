@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..annotation import Span, Timeline
-from ..errors import spans_of
+from ..base.errors import spans_of
 from ..motion.motion import concatenate
-from ..plan import Plan
+from ..synthesis.plan import Plan
 from ..motion.track.ball_path import BallPath
-from ..take import DribbleTouch, Take
+from ..synthesis.take import DribbleTouch, Take
 
 _SAME_TIME = 1e-6
 

@@ -1,4 +1,4 @@
-"""The whole way of a match: files in, a folder out (docs/match.md).
+"""The whole way of a match: files in, a folder out (docs/match/match.md).
 
     made = make_match(MatchOrder(tracking=Path("match.dat"), library=Path("clips"), out=Path("made"), end=60.0))
 
@@ -15,28 +15,28 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
-from ..errors import BeyondMocapError, Cancelled, InputError
-from ..files.event_data import MatchEvents
-from ..files.events import read_events
-from ..files.match_data import Match
+from ..base.errors import BeyondMocapError, Cancelled, InputError
+from ..files.events.event_data import MatchEvents
+from ..files.events.events import read_events
+from ..motion.track.match_data import Match
 from ..files.tables import write_ball
-from ..files.tracking import read_match
+from ..files.tracking.tracking import read_match
 from ..files.whole import atomic_write
 from ..library.library import Library
 from ..library.build import build
-from ..solve_ball import solve_ball
+from ..ball.solve_ball import solve_ball
 from ..motion.track.ball_path import BallPath
-from . import stages
+from .pieces import stages
 from .folder import check_folder, file_names, opened, read_state
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
-from .pool import Workplace, check_place, ended
+from .pieces.pool import Workplace, check_place, ended
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import begun, now, row_of
-from .thumbnails import thumbnails
-from .words import MatchWords, words_of
-from .workplace_library import LibrarySource, hold
+from .report.thumbnails import thumbnails
+from .labels.words import MatchWords, words_of
+from .pieces.workplace_library import LibrarySource, hold
 
 AROUND = 5.0
 """Seconds before and behind the span in which the ball is solved too."""
@@ -222,7 +222,7 @@ def _close(job: stages.Job, crowd) -> None:
     made = len(state.players) - len(state.failed)
     state.tell(status="failed" if not made else "partial" if state.failed else "done")
     if job.order.figures:
-        from ..evaluation.match_report import page
+        from .report import page
 
         path = job.folder.path
         atomic_write(path / "report.html", page(path, thumbnails(job.library, path)))

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from .. import __version__
 from ..base.settings import defaults
-from ..errors import InputError, told_time
-from ..files.event_providers import EVENT_PROVIDERS
-from .content_digest import digest_of_file
-from .units import OVERLAP, WINDOW
+from ..base.errors import InputError, told_time
+from ..files.events.event_providers import EVENT_PROVIDERS
+from .pieces.content_digest import digest_of_file
+from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = defaults("match")
 FORM = 3

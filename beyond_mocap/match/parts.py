@@ -8,15 +8,15 @@ from pathlib import Path
 
 from ..annotation import Timeline, format_timeline
 from ..ball.tracked.solve import SolvedBall
-from ..errors import InputError, told_time
-from ..known_touches import course_of
-from ..plan import Plan
+from ..base.errors import InputError, told_time
+from ..synthesis.known_touches import course_of
+from ..synthesis.plan import Plan
 from .folder import MatchFolder
 from .order import MatchOrder
 from .player_edit import kept
 from .roles import Role
-from .words import USER, MatchWords, Moment, timeline_of
-from .words_text import edited, read_words, write_words
+from .labels.words import USER, MatchWords, Moment, timeline_of
+from .labels.words_text import edited, read_words, write_words
 
 
 @dataclass(frozen=True, eq=False)

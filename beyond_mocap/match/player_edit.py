@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..known_touches import solve_touches
+from ..synthesis.known_touches import solve_touches
 from ..motion.track import Track
-from ..plan import Plan, SolvedCourse
-from ..polish.crowd.correction import Correction
-from .named_edit import NamedEdit
+from ..synthesis.plan import Plan, SolvedCourse
+from .crowd.correction import Correction
+from .pieces.named_edit import NamedEdit
 
 COURSE_STEP = 0.02
 """Seconds between the points of the ball's course that are kept; gravity bends it by half a millimetre in between, a

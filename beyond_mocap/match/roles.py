@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.time_series import interpolate
-from ..errors import InputError, told_time
-from ..files.match_data import Match, MatchPlayer
+from ..base.errors import InputError, told_time
+from ..motion.track.match_data import Match, MatchPlayer
 from ..motion.track import Track, clean
-from ..polish.crowd.spacing import keeping, spaced
-from .cut_plan import cut_track
+from .crowd.spacing import keeping, spaced
+from .pieces.cut_plan import cut_track
 from .order import MatchOrder
-from .variety import lags
+from .crowd.variety import lags
 
 SHORTEST = 1.0
 """Seconds; who is there for less is not made."""
@@ -124,7 +124,7 @@ def _cut(track: Track, start: float, end: float, fps: float) -> Track:
 def pushed_apart(
     roles: Sequence[Role], times: np.ndarray, touches: Mapping[str, Sequence[float]]
 ) -> tuple[tuple[Role, ...], dict[str, float]]:
-    """The roles with tracks that keep out of each other (`polish.crowd.spacing`), and what that took: `longest_m`,
+    """The roles with tracks that keep out of each other (`match.crowd.spacing`), and what that took: `longest_m`,
     `mean_m` where somebody is moved, `seconds` in which somebody is, all players' summed.
 
     times (N,) s: of the feed's samples; touches: by id, seconds at which somebody touches the ball, who then keeps his

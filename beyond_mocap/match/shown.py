@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..library.library import Library
-from ..polish.crowd.attention import looking
-from ..polish.crowd.correction import Correction, applied
-from ..synthesize import look_of
+from .crowd.attention import looking
+from .crowd.correction import Correction, applied
+from ..synthesis.synthesize import look_of
 from ..motion.track.ball_path import BallPath
-from ..take import Take
-from .at_ball import at_ball
+from ..synthesis.take import Take
+from .crowd.restore_ball_contact import at_ball
 from .expand import expanded
 from .joined_takes import own_part
 from .player_edit import PlayerEdit

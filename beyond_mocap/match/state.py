@@ -1,4 +1,4 @@
-"""What match.json says: the order, who is made and how far he is, what was told, and what it took (docs/match.md)."""
+"""What match.json says: the order, who is made and how far he is, what was told, and what it took (docs/match/match.md)."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from .. import __version__
-from ..files.match_data import Match
+from ..motion.track.match_data import Match
 from .folder import MatchFolder
 from .order import MatchOrder
 from .parts import Part
-from .pool import Done, peak_memory
+from .pieces.pool import Done, peak_memory
 
 EVERY = 1.0
 """Seconds between two writings of a state in which only the number of done windows has changed."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from . import quaternion
 from .humanoid import identify
 from .motion import Motion, forward_kinematics

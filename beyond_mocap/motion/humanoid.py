@@ -15,9 +15,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..errors import InputError
-from . import quaternion, structure
-from .arctangent import arctan2
+from ..base.errors import InputError
+from . import quaternion
+from .retargeting import structure
+from ..base.arctangent import arctan2
 from .motion import Motion, forward_kinematics, pose_kinematics
 from .skeleton import Skeleton
 

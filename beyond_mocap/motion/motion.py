@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import InputError
+from ..base.errors import InputError
 from . import quaternion
 from .skeleton import Skeleton, frozen_array
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.vectors import cross, unit_vectors
-from .arctangent import arctan2
+from ..base.arctangent import arctan2
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)

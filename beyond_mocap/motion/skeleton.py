@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base.digest import hex_digest
-from ..errors import InputError
+from ..base.errors import InputError
 
 
 def frozen_array(values, dtype=float) -> np.ndarray:

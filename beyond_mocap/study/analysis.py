@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
-from ..evaluation.throws.compare import judged
+from ..base.errors import InputError
+from ..evaluation.paired_tests import judged
 from .answers import Answers
 from .order import Study
 from .questions import SAME, SCALE

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.tables import read_rows
 from .form import ANSWER_COLUMNS

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.digest import hex_digest
-from ..errors import InputError
+from ..base.errors import InputError
 
 TRAINING = "training"
 """In place of a system: this clip comes first and does not count."""

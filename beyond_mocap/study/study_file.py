@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..errors import InputError
+from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.tables import read_rows, write_report
 from .order import Clip, Study

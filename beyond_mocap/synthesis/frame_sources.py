@@ -8,7 +8,7 @@ import numpy as np
 
 from ..annotation import spoken
 from ..library.library import Library
-from .footage import Shown
+from .search.footage import Shown
 
 
 def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
 from ..files.whole import atomic_write
 from ..motion.skeleton import frozen_array
-from ..take import Take
+from .take import Take
 
 PROVENANCE_COLUMNS = (
     "frame", "time_s", "clip", "clip_frame", "mirrored", "labels", "contact_left", "contact_right",

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from ..annotation import Timeline
 from ..motion.track import SampledTrack, Track
-from ..plan import Plan, SolvedCourse, sample_with_course
+from .plan import Plan, SolvedCourse, sample_with_course
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

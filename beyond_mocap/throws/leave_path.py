@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import TimedLine
+from ..base.errors import TimedLine
 from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.motion import Motion, forward_kinematics, resample
 from ..motion.track import Track, zero_phase_hann
-from ..plan import Plan
-from ..polish.meeting import eased
+from ..synthesis.plan import Plan
+from ..synthesis.construct.ball.meeting import eased
 from .join_throw import FADE, blend_bodies, hold_ends
 from .run_up import SMOOTH, RunUpResult, construct_run_up
 

@@ -15,9 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
-from ..ball.way import hermite
-from ..errors import InputError, TimedLine, told_time
-from ..known_touches import solve_touches
+from ..base.easing import quintic_between
+from ..base.errors import InputError, TimedLine, told_time
+from ..synthesis.known_touches import solve_touches
 from ..library.features import joined as joined_frames
 from ..library.clip import Clip
 from ..library.library import Library
@@ -25,19 +25,19 @@ from ..library.describe_clips import described
 from ..motion import contacts
 from ..motion.humanoid import heading
 from ..motion.motion import Motion, resample
-from ..motion.retarget import Retargeter
+from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, zero_phase_hann
-from ..plan import Plan
-from ..resolve_plan import resolve_plan
-from ..synthesis.balance import balanced
+from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.search.balance import balanced
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.key_moments import find_touches, key_results
-from ..synthesis.edit_list import EditList
-from ..synthesis.footage import Footage, fetch, output_index
-from ..synthesis.path_search import PathSearch
+from ..synthesis.search.edit_list import EditList
+from ..synthesis.search.footage import Footage, fetch, output_index
+from ..synthesis.search.path_search import PathSearch
 from ..synthesis.resolved_plan import ResolvedPlan
 from ..synthesis.search_library import search_library
-from ..synthesis.wanted import Wanted, build_order
+from ..synthesis.search.wanted import Wanted, build_order
 
 OWN_WORD = "generated"
 """The word that only the generated clip carries."""
@@ -253,7 +253,7 @@ def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: t
     low, high = (here, there) if way < 0 else (there, here)
     between = (times > low[0]) & (times < high[0])
     out = places.copy()
-    out[between] = hermite(times[between], low, high)
+    out[between] = quintic_between(times[between], low, high)
     return out
 
 

@@ -19,7 +19,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from ...beyond_mocap.errors import BeyondMocapError
+from ...beyond_mocap.base.errors import BeyondMocapError
 from . import window
 
 TICK, IDLE = 0.05, 0.4  # seconds between two looks: usually, and where there is no window or a look has failed
@@ -181,7 +181,7 @@ def is_waiting(action: Callable) -> bool:
     return action in _timers
 
 
-def register() -> None:
+def start_watching() -> None:
     """Listen, draw and look from now on, for all watchers."""
     for handler, (what, count) in EVENTS.items():
         if not (bpy.app.background and what in WITH_WINDOW):
@@ -194,7 +194,7 @@ def register() -> None:
             soon(watcher.tick, 1.0)
 
 
-def unregister() -> None:
+def stop_watching() -> None:
     """Nothing is called any more, and nothing of ours is left in the windows; each watcher ends."""
     while _handlers:
         handler, function = _handlers.pop()

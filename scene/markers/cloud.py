@@ -13,9 +13,10 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from ...beyond_mocap.errors import InputError
-from .. import bake, linked
-from ..measure import frames_per_second, units_per_metre
+from ...beyond_mocap.base.errors import InputError
+from ..result import bake
+from ..core import linked
+from ..core.measure import frames_per_second, units_per_metre
 from . import lines, nodes
 from .settings import is_cloud
 

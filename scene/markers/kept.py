@@ -8,7 +8,7 @@ import uuid
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.reconstruct import Reconstruction
+    from ...beyond_mocap.markers.reconstruct import Reconstruction
 
 MOST = 30
 

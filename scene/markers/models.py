@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.markers.model import MarkerModel
+    from ...beyond_mocap.markers.model.model import MarkerModel
 
 
 def onto(cloud: bpy.types.Object, model: "MarkerModel") -> None:
     """Keep a model with a cloud; a text that other clouds use too stays as it is."""
-    from ...beyond_mocap.files.model_json import model_text
+    from ...beyond_mocap.markers.files.model_json import model_text
 
     kept = cloud.beyond_mocap_cloud
     if kept.model is None or kept.model.users > 1 or kept.model.library is not None:
@@ -26,7 +26,7 @@ def onto(cloud: bpy.types.Object, model: "MarkerModel") -> None:
 
 def of_cloud(cloud: bpy.types.Object) -> "MarkerModel":
     """The model of a cloud. InputError where there is none, or none that can be read."""
-    from ...beyond_mocap.files.model_json import parse_model
+    from ...beyond_mocap.markers.files.model_json import parse_model
 
     text = cloud.beyond_mocap_cloud.model
     if text is None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..material import colour
+from ..core.material import colour
 
 NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"

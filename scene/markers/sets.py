@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 import bmesh
 import bpy
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from . import lines
 from .settings import is_cloud
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.markers.marker_set import MarkerSet
+    from ...beyond_mocap.markers.model.marker_set import MarkerSet
 
 OWN = "own"
 
@@ -20,7 +20,7 @@ OWN = "own"
 def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     """The marker set that a cloud's labels describe, with what its static trial and the set that was applied say of
     markers that the cloud itself lacks. InputError where no segment has a marker, or names are wrong."""
-    from ...beyond_mocap.markers.marker_set import MarkerSet
+    from ...beyond_mocap.markers.model.marker_set import MarkerSet
 
     kept = cloud.beyond_mocap_cloud
     told = {row.name: (row.segment.strip(), row.landmark, row.role) for row in kept.labels}
@@ -53,7 +53,7 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
 
 def _applied(cloud: bpy.types.Object) -> "MarkerSet | None":
     """The marker set that was applied to a cloud last."""
-    from ...beyond_mocap.files.marker_set_text import parse_marker_set
+    from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
 
     text = cloud.beyond_mocap_cloud.set_text
     return parse_marker_set(text, cloud.name) if text else None
@@ -80,7 +80,7 @@ def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
 
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
     """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
-    from ...beyond_mocap.files.marker_set_text import marker_set_text
+    from ...beyond_mocap.markers.files.marker_set_text import marker_set_text
     from ...beyond_mocap.markers.naming import named_as
     from .cloud import read
 
@@ -109,15 +109,15 @@ def role(marker_set: "MarkerSet", label: str) -> str:
 
 def recognised(labels: tuple[str, ...]) -> "MarkerSet":
     """The shipped set that these labels are of. InputError where none fits."""
-    from ...beyond_mocap.files.marker_set_text import shipped_sets
-    from ...beyond_mocap.markers.marker_set import recognise
+    from ...beyond_mocap.markers.files.marker_set_text import shipped_sets
+    from ...beyond_mocap.markers.model.marker_set import recognise
 
     return recognise(labels, shipped_sets())
 
 
 def assign(cloud: bpy.types.Object, names: list[str], segment: str) -> None:
     """Let these markers belong to a segment; "" frees them."""
-    from ...beyond_mocap.markers.template import JOINTS
+    from ...beyond_mocap.markers.model.template import JOINTS
 
     if segment and segment not in JOINTS:
         raise InputError("segment", f"{segment!r}", f"one of {', '.join(JOINTS)}")

@@ -37,14 +37,14 @@ def shown(kept, _context) -> None:
 
 def segments(_label, _context, typed: str) -> list[str]:
     """The segments that can carry a marker."""
-    from ...beyond_mocap.markers.template import JOINTS
+    from ...beyond_mocap.markers.model.template import JOINTS
 
     return [name for name in JOINTS if typed.lower() in name.lower()]
 
 
 def landmarks(_label, _context, typed: str) -> list[str]:
     """The anatomical points that a marker can lie on."""
-    from ...beyond_mocap.markers.landmarks import LANDMARKS
+    from ...beyond_mocap.markers.model.landmarks import LANDMARKS
 
     return [name for name in sorted(LANDMARKS) if typed.lower() in name]
 
@@ -80,7 +80,7 @@ def a_cloud(_own, thing) -> bool:
 
 
 @with_settings("markers.cloud", update=shown)
-@with_settings("markers.model")
+@with_settings("markers.model.model")
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial that stands in the scene as a cloud of markers."""
 

@@ -10,20 +10,23 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...beyond_mocap.errors import InputError
-from .. import action, armature, bake, body, channels, linked
+from ...beyond_mocap.base.errors import InputError
+from ..core import action, channels, linked
+from ..rigs import armature
+from ..result import bake
+from ..stage import body
 from ..core.properties import property_values
-from ..measure import frames_per_second
-from ..settings import absolute
+from ..core.measure import frames_per_second
+from ..core.settings import absolute
 from . import cloud as clouds
 from . import kept as store
 from . import models, sets, thrown
 from .settings import is_alone, is_cloud
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.markers.model import MarkerModel
+    from ...beyond_mocap.markers.model.model import MarkerModel
     from ...beyond_mocap.markers.trial import MarkerTrial
-    from ...beyond_mocap.reconstruct import Reconstruction, ReconstructSettings
+    from ...beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings
 
 MADE = "beyond_mocap_reconstructed"  # custom property of actions made here; no group has its name
 SKIN = (0.55, 0.55, 0.60)
@@ -73,7 +76,7 @@ def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Obj
 
 def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) -> "ReconstructSettings":
     """The recipe's settings; the marker set is the cloud's own where its markers have segments."""
-    from ...beyond_mocap.reconstruct import ReconstructSettings
+    from ...beyond_mocap.markers.reconstruct import ReconstructSettings
 
     assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
     throw = any(word.startswith("throw") for word in words)

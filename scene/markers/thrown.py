@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .. import ball as balls
-from .. import channels, linked
-from ..measure import frames_per_second, units_per_metre
+from ..stage import ball as balls
+from ..core import channels, linked
+from ..core.measure import frames_per_second, units_per_metre
 from . import cloud as clouds
 from . import kept as store
 from .settings import is_alone
@@ -20,7 +20,7 @@ from .settings import is_alone
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.motion.motion import Motion
-    from ...beyond_mocap.release import Release, ReleaseSettings
+    from ...beyond_mocap.markers.release.release import Release, ReleaseSettings
 
 MADE = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions made here; no group's name
 
@@ -28,7 +28,7 @@ MADE = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) a
 def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "MarkerTrial", "Motion", "ReleaseSettings"]:
     """What is asked of a cloud: its name, its markers as recorded, on the motion's floor, the motion, the settings.
     InputError where its body has not been reconstructed in this session."""
-    from ...beyond_mocap.release import ReleaseSettings
+    from ...beyond_mocap.markers.release.release import ReleaseSettings
 
     linked.refuse(cloud, cloud.data)
     clouds.played_rate(cloud, scene)

@@ -6,8 +6,9 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.track.ball_path import BallPath
-from .. import action, ball, channels
-from ..measure import frames_per_second, units_per_metre
+from ..core import action, channels
+from ..stage import ball
+from ..core.measure import frames_per_second, units_per_metre
 from . import ours
 from .people import Person
 

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.motion import Motion
-from .. import armature
-from ..measure import units_per_metre
+from ..rigs import armature
+from ..core.measure import units_per_metre
 from . import ours
 from .kits import Kit, cloth, kit_of
 from .people import Person
@@ -56,14 +56,14 @@ class Wardrobe:
 
     def _shape(self, example: Motion, fits: tuple):
         """The low-poly body on those bones."""
-        from ...beyond_mocap.motion.body import low_poly_body  # brings scipy, which is slow to import
+        from ...beyond_mocap.appearance.body import low_poly_body  # brings scipy, which is slow to import
 
         if fits not in self.shapes:
             self.shapes[fits] = low_poly_body(example.skeleton, example=example)
         return self.shapes[fits]
 
     def _body(self, example: Motion, fits: tuple, kit: Kit) -> bpy.types.Mesh:
-        from ...beyond_mocap.motion.body import MATERIALS
+        from ...beyond_mocap.appearance.body import MATERIALS
 
         key = (fits, kit.name)
         if key not in self.meshes:

@@ -12,12 +12,12 @@ import numpy as np
 
 from ...beyond_mocap.base.time_series import gaussian_smooth
 from ...beyond_mocap.base.vectors import unit_vectors
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
-from .. import action, channels
-from ..measure import frames_per_second, units_per_metre
+from ..core import action, channels
+from ..core.measure import frames_per_second, units_per_metre
 from . import ours
 
 STAND, EYES = "Match Broadcast", "Match Eyes"
@@ -86,7 +86,7 @@ def eyes(scene: bpy.types.Scene, who: bpy.types.Object, ball: bpy.types.Object |
 def view_of(motion: Motion, target: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Place (T, 3) m and rotation (T, 4) of a camera at a body's eyes. target: (T, 3) m of what it would look at, NaN
     where there is nothing."""
-    from ...beyond_mocap.motion.neutral import neutral_stance  # brings scipy, which is slow to import
+    from ...beyond_mocap.motion.retargeting.neutral import neutral_stance  # brings scipy, which is slow to import
 
     skeleton = motion.skeleton
     head, neutral = identify(skeleton).head_or_neck, neutral_stance(skeleton, motion)

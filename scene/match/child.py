@@ -17,7 +17,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from ...beyond_mocap.errors import BeyondMocapError, Cancelled
+from ...beyond_mocap.base.errors import BeyondMocapError, Cancelled
 
 LOOK = 0.1  # seconds between two looks whether somebody wants out
 PATIENCE = 60.0  # seconds that a cancelled process has to come to its end

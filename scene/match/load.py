@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...beyond_mocap.errors import Cancelled, InputError, told_time
+from ...beyond_mocap.base.errors import Cancelled, InputError, told_time
 from .people import TEAMS, Person, Scenery
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
 
 def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
     """Everybody who is there and was made, and lines about the others."""
-    from ...beyond_mocap.files.take_npz import read_player
+    from ...beyond_mocap.match.take_npz import read_player
     from ...beyond_mocap.match.shown import shown
 
     people, lines, trouble = [], [], None

@@ -13,7 +13,7 @@ from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.motion.body import BodyMesh
+    from ...beyond_mocap.appearance.body import BodyMesh
 
 SIZES = {"back": 0.235, "chest": 0.095}  # metres that digits are tall
 WIDEST = {"back": 0.26, "chest": 0.13}  # metres that two digits may take
@@ -24,7 +24,7 @@ def shapes(
     number: int, body: "BodyMesh", skeleton: Skeleton, example: Motion
 ) -> tuple[np.ndarray, list[tuple[int, ...]], np.ndarray, np.ndarray]:
     """Vertices (V, 3) m in the rest pose, faces, joints (V, 6) and weights (V, 6) of `number` on back and chest."""
-    from ...beyond_mocap.motion.shirt_number import on_shirt  # brings scipy, which is slow to import
+    from ...beyond_mocap.appearance.shirt_number import on_shirt  # brings scipy, which is slow to import
 
     scale = float(np.ptp(body.vertices, axis=0).max()) / 1.8
     vertices, faces, joints, weights = [], [], [], []

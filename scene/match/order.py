@@ -8,9 +8,9 @@ from pathlib import Path
 import bpy
 
 from ...beyond_mocap.base.digest import hex_digest
-from ...beyond_mocap.errors import InputError
-from .. import preferences
-from ..settings import absolute
+from ...beyond_mocap.base.errors import InputError
+from ..core import preferences
+from ..core.settings import absolute
 from .load import Wanted
 from .settings import AUTO, BeyondMocapMatch, colours_of, typed
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from .people import TEAMS
 
 MARK = "beyond_mocap_match"

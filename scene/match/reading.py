@@ -7,15 +7,15 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ...beyond_mocap.errors import InputError
-from .. import tracks
-from ..settings import absolute, as_setting
+from ...beyond_mocap.base.errors import InputError
+from ..player import tracks
+from ..core.settings import absolute, as_setting
 from .kits import USUAL, linear
 from .people import TEAMS
 from .settings import AUTO, FIRST, BeyondMocapMatch
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.files.match_data import Match
+    from ...beyond_mocap.motion.track.match_data import Match
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from bpy.props import (
     BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
 )
 
-from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
-from ...beyond_mocap.files.providers import PROVIDERS
+from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
+from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..core.properties import with_settings
 from .kits import USUAL, linear, repaint, written
 
@@ -42,7 +42,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     position: StringProperty(name="Position", description="Where he plays, where the feed tells")
 
 
-@with_settings("match.section", "match.work", "match")
+@with_settings("match.section", "match.pieces.work", "match")
 class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 

@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..measure import frames_per_second, units_per_metre
+from ..core.measure import frames_per_second, units_per_metre
 from ..passes import rally
 from . import colours, shapes
 from .prepare import Mesh

@@ -13,15 +13,15 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..aimed import shots
-from ..aimed.settings import aimed
-from ..measure import units_per_metre
+from ..ball import shots
+from ..ball.settings import aimed
+from ..core.measure import units_per_metre
 from . import colours, shapes
 from .prepare import Mesh
 from .rides import Item
 
 if TYPE_CHECKING:
-    from ..aimed.shots import Solved
+    from ..ball.shots import Solved
 
 MOST = 40  # candidates that are drawn
 SPEED = 0.04  # metres of a line for each m/s of the striking part

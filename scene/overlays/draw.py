@@ -15,7 +15,7 @@ from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
 from ..core.live import Watcher
-from ..settings import active_player
+from ..core.settings import active_player
 from . import ball_rallies, ball_shots, colours, legend, place, rides, shapes, store
 from .prepare import Mesh, Prepared
 

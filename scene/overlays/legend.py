@@ -6,7 +6,7 @@ import blf
 import gpu
 from gpu_extras.batch import batch_for_shader
 
-from .. import areas
+from ..core import areas
 from . import colours
 
 SIZE, MARGIN, LINE = 11, 5, 1.4  # points, points, sizes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 from mathutils import Matrix
 
-from ..action import PLACED
-from ..measure import frames_per_second, units_per_metre
+from ..core.action import PLACED
+from ..core.measure import frames_per_second, units_per_metre
 
 def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
     """What the tracking file's clock shows at a scene frame, or now."""

@@ -12,9 +12,9 @@ from . import colours, shapes
 if TYPE_CHECKING:  # the core's modules are slow to import, and switching the extension on has to be quick
     from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.plan import Plan
-    from ...beyond_mocap.synthesis.why import Reason
-    from ...beyond_mocap.take import Take
+    from ...beyond_mocap.synthesis.plan import Plan
+    from ...beyond_mocap.synthesis.search.why import Reason
+    from ...beyond_mocap.synthesis.take import Take
 
 RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each over the last
 RAILS, HALF_SEAM = (0.13, 0.17), 0.35
@@ -88,7 +88,7 @@ class Prepared:
 
 def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     """Everything about one take. library: what it was made from; None: nothing is compared with its recordings."""
-    from ...beyond_mocap.evaluation import played_from_take
+    from ...beyond_mocap.synthesis.quality.played import played_from_take
     from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
     from ...beyond_mocap.evaluation.view import View
 
@@ -233,15 +233,15 @@ def _told(plan: "Plan", take: "Take", library: "Library | None"):
 
 
 def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
-    from ...beyond_mocap.resolve_plan import resolve_plan
-    from ...beyond_mocap.synthesis.why import explain_choices
+    from ...beyond_mocap.synthesis.resolve_plan import resolve_plan
+    from ...beyond_mocap.synthesis.search.why import explain_choices
 
     return explain_choices(library, resolve_plan(plan, library, course=take.solved), take.edit)
 
 
 def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
     """Why a piece was chosen, in a few lines."""
-    from ...beyond_mocap.synthesis.why import PARTS
+    from ...beyond_mocap.synthesis.search.why import PARTS
 
     lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
     lines.append(

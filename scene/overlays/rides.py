@@ -13,14 +13,14 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..measure import units_per_metre
-from ..ride import riders
-from ..ride.settings import riders as riding
+from ..core.measure import units_per_metre
+from ..path_editing import riders
+from ..path_editing.settings import riders as riding
 from . import colours, shapes
 from .prepare import Mesh
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.ride import Ridden, RideSource
+    from ...beyond_mocap.path_editing.ride import Ridden, RideSource
 
 LIFT = 0.012  # metres above the ground
 EVERY = 0.2  # seconds from one faint residual to the next

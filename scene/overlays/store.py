@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from .. import background, session
+from ..core import background, session
 from ..core import window
 from ..core.live import Watcher, soon
-from ..settings import active_player
+from ..core.settings import active_player
 from . import place
 
 if TYPE_CHECKING:

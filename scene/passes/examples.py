@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import bpy
 
 from ...beyond_mocap.ball.contact import Tool
-from ...beyond_mocap.errors import InputError
-from ..ride.carrier import MARK, carrier_of
+from ...beyond_mocap.base.errors import InputError
+from ..path_editing.carrier import MARK, carrier_of
 from . import hits_shown
 from .settings import BeyondMocapPass, BeyondMocapPasses
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.ball.hits import HitMotion
+    from ...beyond_mocap.passes.hits import HitMotion
 
 _MOST_KEPT = 32
 _found: dict[tuple, "HitMotion"] = {}  # by all that it was read from; asked for again and again during a drag
@@ -73,7 +73,7 @@ def forget() -> None:
 
 
 def _look(scene, row: BeyondMocapPass, part: str, side: str, tool: Tool | None) -> "HitMotion":
-    from ...beyond_mocap.ball.hits import strongest
+    from ...beyond_mocap.passes.hits import strongest
 
     body = row.actor
     motion, start = hits_shown.motion_of(scene, body)

@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
-from .. import action, channels, linked
-from ..ride.carrier import carrier_of
+from ...beyond_mocap.base.errors import InputError
+from ..core import action, channels, linked
+from ..path_editing.carrier import carrier_of
 from ..core.live import Watcher
-from ..ride.rigs import rides_as_rig
+from ..path_editing.rigs import rides_as_rig
 from . import graph
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.ball.hits import Hits
+    from ...beyond_mocap.passes.hits import Hits
     from ...beyond_mocap.motion.motion import Motion
 
 MARKER = "hit"  # the names of our markers begin with it
@@ -39,9 +39,9 @@ def analyse(
 ) -> "Hits":
     """Find the strikes in an armature's motion, note them for the panel and mark them on its action.
 
-    part, side, bone, threshold: see `beyond_mocap.ball.hits.analyse`; threshold 0: automatic. markers: whether to mark.
+    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to mark.
     """
-    from ...beyond_mocap.ball.hits import analyse as find
+    from ...beyond_mocap.passes.hits import analyse as find
 
     linked.refuse(body)
     motion, first = motion_of(scene, body)

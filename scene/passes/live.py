@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.errors import BeyondMocapError
-from .. import background
+from ...beyond_mocap.base.errors import BeyondMocapError
+from ..core import background
 from ..core import window
 from ..core.live import Watcher, is_playing
 from . import rally

@@ -10,21 +10,24 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.ball.contact import Tool
-from ...beyond_mocap.ball.pass_scene import Net, PassScene
+from ...beyond_mocap.passes.pass_scene import Net, PassScene
 from ...beyond_mocap.base.digest import byte_digest
-from ...beyond_mocap.errors import InputError
-from .. import action, armature, bake, ball, body, channels, linked, preferences, session
-from ..measure import frames_per_second, units_per_metre
-from ..ride import riders
-from ..set_aside import bring_back, drop, put_aside
-from ..settings import absolute
+from ...beyond_mocap.base.errors import InputError
+from ..core import action, channels, linked, preferences, session
+from ..rigs import armature
+from ..result import bake
+from ..stage import ball, body
+from ..core.measure import frames_per_second, units_per_metre
+from ..path_editing import riders
+from ..core.set_aside import bring_back, drop, put_aside
+from ..core.settings import absolute
 from . import order as asked
 from . import held_tool, possession, rally, shown
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.passes import Passes
+    from ...beyond_mocap.passes.passes import Passes
 
 BALL, NET = "Passing Ball", "Net"
 MESH = 0.1  # metres between two threads of the net
@@ -85,7 +88,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """Build the library where it is not there yet, and play the scene. Never touches bpy."""
     from ...beyond_mocap.library.build import build
-    from ...beyond_mocap.passes import passes
+    from ...beyond_mocap.passes.passes import passes
 
     library = order.library
     if library is None:
@@ -96,7 +99,7 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
 
 def flights(order: Order, cancelled) -> rally.Rally:
     """What is drawn of a scene while it is dragged: its flights alone, without bodies. Never touches bpy."""
-    from ...beyond_mocap.passes import ball_of, planned
+    from ...beyond_mocap.passes.passes import ball_of, planned
 
     plan = planned(order.library, order.scene, None, cancelled)
     return rally.of_plan(plan, ball_of(order.scene), order.start)

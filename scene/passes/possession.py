@@ -18,13 +18,14 @@ import numpy as np
 from mathutils import Matrix, Quaternion, Vector
 
 from ...beyond_mocap.base.easing import smoothstep
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
-from .. import armature, channels, linked
-from ..measure import frames_per_second, units_per_metre
-from ..ride.rig_look import alone
-from ..result import BeyondMocapBefore
-from ..set_aside import bring_back, put_aside
+from ..rigs import armature
+from ..core import channels, linked
+from ..core.measure import frames_per_second, units_per_metre
+from ..path_editing.rig_look import alone
+from ..result.result import BeyondMocapBefore
+from ..core.set_aside import bring_back, put_aside
 from .settings import KEPT, BeyondMocapHold
 
 CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it
@@ -287,7 +288,7 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
 
 def _turn(mode: str, values: np.ndarray) -> Quaternion:
     """A rotation from the values of its channel in a rotation mode."""
-    from ..ride.rig_look import turns
+    from ..path_editing.rig_look import turns
 
     return Quaternion(turns(mode, values[None])[0])
 

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.ball.pass_plan import PassPlan
+    from ...beyond_mocap.passes.pass_plan import PassPlan
     from ...beyond_mocap.ball.physics import Ball
 
 STEP = 0.03  # s between two points of a way

@@ -10,7 +10,7 @@ from bpy.props import (
 )
 
 from ..core.properties import with_settings
-from ..result import BeyondMocapBefore
+from ..result.result import BeyondMocapBefore
 
 SAMPLES = (
     ("three", "Three", "Three players, a triangle of passes"),

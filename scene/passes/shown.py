@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import bpy
 
-from .. import channels, linked
-from ..set_aside import bring_back, drop
+from ..core import channels, linked
+from ..core.set_aside import bring_back, drop
 from . import held_tool
 from .settings import KEPT, BeyondMocapPasser
 

@@ -9,12 +9,16 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
-from ...beyond_mocap.errors import InputError
-from .. import bake, ball, channels, dots, lanes, lay_strips, linked, strips, tracks
-from ..clock import of_scene
-from ..measure import frames_per_second
-from ..settings import BeyondMocapPlayer, active_player, absolute
-from ..strip_lines import said
+from ...beyond_mocap.base.errors import InputError
+from ..result import bake
+from ..stage import ball
+from ..core import channels, linked
+from ..player import dots, tracks
+from ..timeline import lanes, lay_strips, strips
+from ..core.clock import of_scene
+from ..core.measure import frames_per_second
+from ..core.settings import BeyondMocapPlayer, active_player, absolute
+from ..timeline.strip_lines import said
 from . import possession
 from .settings import KEPT
 
@@ -58,7 +62,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 
 def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
     """Read what has to be read, and solve; never touches bpy's data."""
-    from ...beyond_mocap.solve_ball import solve_ball
+    from ...beyond_mocap.ball.solve_ball import solve_ball
 
     if order.tracks:
         source = together(order.tracks)
@@ -72,7 +76,7 @@ def together(named: tuple):
     """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a
     track."""
     from ...beyond_mocap.ball.tracked.solve import PITCH
-    from ...beyond_mocap.files.tracking import Match, MatchPlayer
+    from ...beyond_mocap.files.tracking.tracking import Match, MatchPlayer
 
     name, first = named[0]
     if len(named) == 1:

@@ -8,8 +8,8 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import hex_digest
-from ...beyond_mocap.errors import InputError
-from .. import channels
+from ...beyond_mocap.base.errors import InputError
+from ..core import channels
 from .driven import Driven
 from .posing import CHANNELS
 

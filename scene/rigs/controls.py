@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from .control_study import RIDES, STATIC, TRIALS, nearest_carrier, place_spread, split_poses, turn_spread
 from .posing import PosedRig

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
-from .. import armature
+from . import armature
 from ...beyond_mocap.base.vectors import nearest_axis
 from .driven import Driven
 from .source import Source
@@ -45,8 +45,8 @@ class Fit:
 
     def __init__(self, driven: Driven, source: Source, options: BakeOptions):
         from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
-        from ...beyond_mocap.motion.retarget import Retargeter
-        from ...beyond_mocap.polish.foot_plant import plant
+        from ...beyond_mocap.motion.retargeting.retarget import Retargeter
+        from ...beyond_mocap.motion.foot_plant import plant
 
         if options.exact:
             self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
@@ -128,7 +128,7 @@ def _stand_spread(motion: Motion, points: np.ndarray) -> float:
 
 def slide(motion: Motion, standing: np.ndarray) -> Slide:
     """How far the feet of a motion slide while `standing` (T, 2) says that they stand."""
-    from ...beyond_mocap.evaluation import feet
+    from ...beyond_mocap.synthesis.quality import feet
 
     joints = feet.foot_joints(motion.skeleton)
     places = forward_kinematics(motion)[0][:, joints]

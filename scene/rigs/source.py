@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
-from .. import action, armature, channels
-from ..measure import frames_per_second, units_per_metre
+from ..core import action, channels
+from . import armature
+from ..core.measure import frames_per_second, units_per_metre
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,18 +12,19 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...beyond_mocap.ball.hits import HitMotion
-from ...beyond_mocap.errors import BeyondMocapError, InputError
-from .. import action, background, bake, linked
+from ...beyond_mocap.passes.hits import HitMotion
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..core import action, background, linked
+from ..result import bake
 from ..core.live import Watcher
-from ..measure import frames_per_second
+from ..core.measure import frames_per_second
 from ..passes import make
 from ..passes.settings import PLAYED
 from . import follow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.live_passes import Piece, Rally
+    from ...beyond_mocap.passes.live_passes import Piece, Rally
 
 _held: dict[str, object] = {}
 
@@ -39,7 +40,7 @@ class Begun:
 
 def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
     """Build the library where it is not there yet, and let everybody stand. Never touches bpy."""
-    from ...beyond_mocap import live_passes
+    from ...beyond_mocap.passes import live_passes
     from ...beyond_mocap.library.build import build
 
     library = order.library
@@ -98,7 +99,7 @@ def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
 
 def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
     """The strike of an armature's own motion that is nearest to the present frame. InputError where there is none."""
-    from ...beyond_mocap.ball.hits import analyse
+    from ...beyond_mocap.passes.hits import analyse
 
     settings, motion = scene.beyond_mocap_stream, action.read(body, scene)
     sided = settings.part in ("foot", "hand", "tool")
@@ -148,7 +149,7 @@ def _order(scene, hit: HitMotion) -> tuple:
 
 
 def _answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> Piece:
-    from ...beyond_mocap.live_passes import answer
+    from ...beyond_mocap.passes.live_passes import answer
 
     return answer(library, one, now, hit, to, bounces, progress, cancelled)
 
@@ -175,7 +176,7 @@ def _apply(scene, piece: Piece) -> None:
 
 
 def _lay(scene, one: Rally, names: list[str]) -> None:
-    from ...beyond_mocap.passes import ball_of
+    from ...beyond_mocap.passes.passes import ball_of
 
     rows = {row.name: row for row in scene.beyond_mocap_passes.players}
     if missing := [name for name in names if name not in rows]:

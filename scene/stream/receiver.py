@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from ...beyond_mocap.errors import InputError
-from ...beyond_mocap.stream.bvh_stream import hierarchy_of
-from ...beyond_mocap.stream.listener import Listener
-from ...beyond_mocap.stream.live_hits import LiveHits
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.passes.stream.bvh_stream import hierarchy_of
+from ...beyond_mocap.passes.stream.listener import Listener
+from ...beyond_mocap.passes.stream.live_hits import LiveHits
 from ..core.live import Watcher
 
 _held: dict[str, object] = {}

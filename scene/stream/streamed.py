@@ -5,12 +5,15 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
-from .. import action, armature, bake, body
-from ..measure import frames_per_second
+from ..core import action
+from ..rigs import armature
+from ..result import bake
+from ..stage import body
+from ..core.measure import frames_per_second
 
 MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)

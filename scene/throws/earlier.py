@@ -6,11 +6,11 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...beyond_mocap.errors import InputError
-from .. import channels
-from ..measure import units_per_metre
+from ...beyond_mocap.base.errors import InputError
+from ..core import channels
+from ..core.measure import units_per_metre
 from ..passes import possession
-from ..set_aside import stance_of
+from ..core.set_aside import stance_of
 from .settings import BeyondMocapThrow
 
 

@@ -13,14 +13,15 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion import quaternion
-from .. import ball as balls
-from .. import bake, channels
-from ..aimed.shots import CLOSEST, trajectory
-from ..measure import units_per_metre
+from ..stage import ball as balls
+from ..result import bake
+from ..core import channels
+from ..ball.shots import CLOSEST, trajectory
+from ..core.measure import units_per_metre
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
-from ..set_aside import bring_back, drop, put_aside
+from ..core.set_aside import bring_back, drop, put_aside
 from . import earlier
 from .settings import MARK, BeyondMocapThrow
 

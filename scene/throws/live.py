@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import bpy
 
-from .. import background
+from ..core import background
 from ..core.live import Watcher, attempt
 from . import made, order, shown
 

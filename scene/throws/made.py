@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
-    from ...beyond_mocap.throw import Thrown
+    from ...beyond_mocap.throws.throw import Thrown
     from ...beyond_mocap.throws.join_throw import JoinedThrow
 
 FOLLOWED, LONGEST = 3.0, 10.0
@@ -41,7 +41,7 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     """The throw, and the motion it is part of. Never touches bpy."""
     from ...beyond_mocap.ball.flight import fly
     from ...beyond_mocap.library.build import build
-    from ...beyond_mocap.motion.retarget import Retargeter
+    from ...beyond_mocap.motion.retargeting.retarget import Retargeter
     from ...beyond_mocap.throws.join_throw import EASED, FADE, join_throw, library_jerk, stand_still, transition_jerk
     from ...beyond_mocap.throws.leave_path import leave_path
 
@@ -141,15 +141,15 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
 
 def _model(order: Order):
     """The trained model that is asked for."""
-    from ...beyond_mocap.files.network_npz import read_model
-    from ...beyond_mocap.throw import shipped_model
+    from ...beyond_mocap.throws.network_npz import read_model
+    from ...beyond_mocap.throws.throw import shipped_model
 
     return read_model(order.model) if order.model else shipped_model(order.act)
 
 
 def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
     """The throw that begins, or is at its release, or finds the ball, `where`."""
-    from ...beyond_mocap import throw
+    from ...beyond_mocap.throws import throw
 
     asked = throw.Order(
         target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind,

@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
-from .. import action, armature, channels, linked, preferences, session
-from ..measure import frames_per_second
+from ...beyond_mocap.base.errors import InputError
+from ..core import action, channels, linked, preferences, session
+from ..rigs import armature
+from ..core.measure import frames_per_second
 from ..passes import possession
-from ..settings import absolute
+from ..core.settings import absolute
 from . import earlier, rigged, targets
 from .settings import LIMBS, USUAL
 

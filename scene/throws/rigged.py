@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ...beyond_mocap.errors import InputError
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .. import bone_maps, channels, rig_bake
-from ..ride.carrier import carrier_of
-from ..ride.rigs import is_plain
+from ..rigs import bone_maps, rig_bake
+from ..core import channels
+from ..path_editing.carrier import carrier_of
+from ..path_editing.rigs import is_plain
 from ..rigs import bake_record
 from ..rigs.driven import Driven, check
 from ..rigs.fit import BakeOptions

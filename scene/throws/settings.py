@@ -7,7 +7,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core.properties import with_settings
-from ..result import BeyondMocapBefore
+from ..result.result import BeyondMocapBefore
 
 USUAL = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}

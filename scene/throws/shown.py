@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from .. import action, bake, channels, linked, session
+from ..core import action, channels, linked, session
+from ..result import bake
 from ..rigs.bake_record import BEFORE, KEYS
 from ..rigs.bake_record import MARK as BAKE_MARK
-from ..measure import frames_per_second
-from ..set_aside import bring_back, drop, put_aside
+from ..core.measure import frames_per_second
+from ..core.set_aside import bring_back, drop, put_aside
 from . import flown, order, rigged
 from .settings import MARK
 

@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...beyond_mocap.errors import InputError
-from ..measure import frames_per_second, units_per_metre
-from ..ride.rig_look import alone
+from ...beyond_mocap.base.errors import InputError
+from ..core.measure import frames_per_second, units_per_metre
+from ..path_editing.rig_look import alone
 from .settings import BeyondMocapThrow
 
 LONGEST = 8.0

@@ -110,7 +110,7 @@ def edit_points():
 
 def lay_cameras():
     """Cameras round a path of three metres."""
-    cameras = importlib.import_module(f"{EXTENSION}.scene.path_cameras")
+    cameras = importlib.import_module(f"{EXTENSION}.scene.stage.path_cameras")
     places = np.linspace((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), 20)
     cameras.set_up(bpy.context.scene, cameras.Route(places, np.arange(1.0, 21.0), places, np.zeros(20)))
 
@@ -490,7 +490,7 @@ def operators():
 
 @pytest.fixture(scope="module")
 def session(extension):
-    module = importlib.import_module(f"{extension.__name__}.scene.session")
+    module = importlib.import_module(f"{extension.__name__}.scene.core.session")
     yield module
     module.clear()
 

@@ -11,7 +11,7 @@ _folder = tempfile.TemporaryDirectory(prefix="beyond-mocap-models-")
 SCRIPT = """
 import sys
 sys.path[:0] = [{core!r}, {top!r}]
-from beyond_mocap.files.network_npz import write_model
+from beyond_mocap.throws.network_npz import write_model
 from linear_throws import linear_model, planted_{act}
 write_model(linear_model(planted_{act}(), {action!r}), {out!r})
 """

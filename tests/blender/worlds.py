@@ -59,11 +59,11 @@ def plant_markers():
     if (MARKERS / "static.trc").exists():
         return
     core = f"{EXTENSION}.beyond_mocap"
-    gait = importlib.import_module(f"{core}.motion.gait").gait(1.4, 0.6, fps=100.0)
-    known = importlib.import_module(f"{core}.markers.planted").planted(
+    gait = importlib.import_module(f"{core}.synthetic.gait").gait(1.4, 0.6, fps=100.0)
+    known = importlib.import_module(f"{core}.synthetic.ground_truth.planted_markers").planted(
         gait, "plug_in_gait", seed=3, occlusion=0.02, swaps=0, jumps=0, unlabeled=1
     )
-    write = importlib.import_module(f"{core}.files.trc_write").write_trc
+    write = importlib.import_module(f"{core}.markers.files.trc_write").write_trc
     write(known.trial, MARKERS / "walk.trc")
     write(known.static.frames(0, 40), MARKERS / "static.trc")
 

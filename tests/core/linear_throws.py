@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from beyond_mocap.ball.made_kicks import kick
-from beyond_mocap.errors import InputError
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.synthesis.phase_network.example import example_of
-from beyond_mocap.synthesis.phase_network.limits import learn
-from beyond_mocap.synthesis.phase_network.model import ModelSettings, ThrowModel
-from beyond_mocap.synthesis.phase_network.network import PhaseNetwork
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, training_set
+from beyond_mocap.throws.made_kicks import kick
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.networks.example import example_of
+from beyond_mocap.throws.networks.limits import learn
+from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
+from beyond_mocap.throws.networks.network import PhaseNetwork
+from beyond_mocap.throws.networks.training_set import leg_reach, training_set
 
 FAR = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
 
@@ -71,7 +71,7 @@ def _linear(rows, units, ridge):
 
 def planted_kicks(count=5, seed=0, fps=30.0):
     """Made kicks of one body at known targets, in the normalised frame."""
-    from beyond_mocap.ball.made_kicks import kick
+    from beyond_mocap.throws.made_kicks import kick
 
     random, found = np.random.default_rng(seed), []
     while len(found) < count:

@@ -2,7 +2,7 @@
 
 Every import of every file is written as one dotted name from the clone's top, so that
 `from ..plan import Plan` in `beyond_mocap/library/features.py` is
-`beyond_mocap.plan.Plan`. A rule then is a list of prefixes a room may use.
+`beyond_mocap.synthesis.plan.Plan`. A rule then is a list of prefixes a room may use.
 """
 
 import ast
@@ -31,19 +31,19 @@ ROOMS = {
     "motion": [],
     "annotation": ["motion"],
     "plan": ["motion", "annotation"],
-    "take": ["motion", "annotation", "plan", "synthesis.edit_list"],
-    "markers": ["motion", "polish.reach", "polish.foot_plant"],
-    "files": ["motion", "annotation", "take", "plan", "match.named_edit", "match.player_edit",
-              "polish.crowd.correction",
-              "ball.pass_scene", "ball.contact", "markers", "synthesis.phase_network"],
-    "library": ["motion", "annotation", "files", "polish.foot_plant"],
-    "synthesis": ["motion", "annotation", "plan", "library", "polish.reach", "polish.time_warp"],
-    "synthesis.phase_network": ["motion", "polish.reach"],
+    "take": ["motion", "annotation", "plan", "synthesis.search.edit_list"],
+    "markers": ["motion", "motion.reach", "motion.foot_plant"],
+    "files": ["motion", "annotation", "take", "plan", "match.pieces.named_edit", "match.player_edit",
+              "match.crowd.correction",
+              "passes.pass_scene", "ball.contact", "markers", "throws.networks"],
+    "library": ["motion", "annotation", "files", "motion.foot_plant"],
+    "synthesis": ["motion", "annotation", "plan", "library", "motion.reach", "polish.time_warp"],
+    "throws.networks": ["motion", "motion.reach"],
     "synthesis.construct": ["motion", "annotation", "library", "plan", "own_size", "take", "polish", "synthesis"],
     "polish": ["motion"],
     "ball": ["motion", "annotation", "library", "polish", "markers.trial", "markers.frames"],
     "stream": ["motion", "files", "ball"],
-    "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers", "synthesis.phase_network"],
+    "evaluation": ["motion", "annotation", "plan", "take", "ball", "library", "markers", "throws.networks"],
     "study": ["files", "evaluation"],
 }
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
@@ -58,8 +58,8 @@ LAZY = {
 EXTENSION = {
     "scene": ["scene", CORE],
     "operators": ["operators", "scene", CORE],
-    "panels": ["panels", "scene.core.registration", "scene.settings", "scene.preferences", "scene.ride.settings",
-               "scene.ride.figure_lines", "scene.passes.settings", "scene.passes.graph", "scene.aimed.settings",
+    "panels": ["panels", "scene.core.registration", "scene.core.settings", "scene.core.preferences", "scene.path_editing.settings",
+               "scene.path_editing.figure_lines", "scene.passes.settings", "scene.passes.graph", "scene.ball.settings",
                "scene.match.settings", "scene.throws.settings", "scene.markers.settings"],
 }
 
@@ -192,8 +192,8 @@ def test_training_imports_only_what_it_may():
     ("beyond_mocap/library/a.py", "from ..synthesize import synthesize"),
     ("beyond_mocap/synthesis/a.py", "from ..polish import smoothing"),
     ("beyond_mocap/synthesis/phase_network/a.py", "from ...library import features"),
-    ("beyond_mocap/plan.py", "from beyond_mocap.motion import track"),
-    ("beyond_mocap/synthesize.py", "import pandas"),
+    ("beyond_mocap/synthesis/plan.py", "from beyond_mocap.motion import track"),
+    ("beyond_mocap/synthesis/synthesize.py", "import pandas"),
 ])
 def test_a_planted_offence_in_the_core_is_seen(path, text):
     assert len(complaints(core_complaint, pathlib.Path(path), text)) == 1
@@ -203,7 +203,7 @@ def test_a_planted_offence_in_the_core_is_seen(path, text):
     ("beyond_mocap/motion/a.py", "import numpy as np\nfrom . import quaternion\nfrom .skeleton import Skeleton"),
     ("beyond_mocap/library/a.py", "def f():\n    from sklearn.cluster import KMeans"),
     ("beyond_mocap/synthesis/a.py", "from ..polish.reach import solve\nfrom ..polish import reach"),
-    ("beyond_mocap/synthesize.py", "from .polish import smoothing\nfrom .plan import Plan"),
+    ("beyond_mocap/synthesis/synthesize.py", "from .polish import smoothing\nfrom .plan import Plan"),
 ])
 def test_what_is_allowed_in_the_core_passes(path, text):
     assert complaints(core_complaint, pathlib.Path(path), text) == []

@@ -121,7 +121,7 @@ def check_the_ball_of_a_match_is_solved_and_accepted():
     window.picture(PICTURES / "ball_solved.png")
     yield from press("accept_touches", "touches()")
     yield from settled()
-    found = [moment.key.words for moment in room("scene.lanes").moments(settings().players["player2"].dot)]
+    found = [moment.key.words for moment in room("scene.timeline.lanes").moments(settings().players["player2"].dot)]
     assert found == [("receive", "foot"), ("kick",)], (found, printed_since(mark)[-600:])
     back()
     assert_no_trouble_since(mark)

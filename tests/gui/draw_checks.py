@@ -14,7 +14,7 @@ def player():
 
 def made():
     """The player's newest take."""
-    return room("scene.session").made(player().take)
+    return room("scene.core.session").made(player().take)
 
 
 def hips(frame):
@@ -40,7 +40,7 @@ def drawn():
     area = window.area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     look_down(area)
-    run("beyond_mocap.synthesize")
+    run("beyond_mocap.synthesis.synthesize")
     yield from settled()
     yield from until(lambda: player().take)
 

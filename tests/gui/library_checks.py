@@ -180,7 +180,7 @@ def check_dropped_files():
 
     def spans():
         player = settings().players[settings().active_player]
-        return [span.words for span in room("scene.strips").read(player, window.window.scene).spans]
+        return [span.words for span in room("scene.timeline.strips").read(player, window.window.scene).spans]
 
     yield from until(lambda: spans() == [("running",)], what=spans)
 

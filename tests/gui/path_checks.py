@@ -17,7 +17,7 @@ BEFORE = {}  # curve and body before the hand moved them
 
 def long_walk():
     """The sample's walk repeated on a straight line until it has 600 frames, as a BVH file."""
-    bvh, ride, line = room("beyond_mocap.files.bvh"), room("beyond_mocap.ride"), room("beyond_mocap.polish.path_line")
+    bvh, ride, line = room("beyond_mocap.files.bvh.bvh"), room("beyond_mocap.path_editing.ride"), room("beyond_mocap.path_editing.path_line")
     clip = bvh.read(sample() / "library" / "walking_1_2.bvh", 0.01)
     wishes = ride.RideSettings(cycle=True, plant=False, lean=False)
     straight = line.through(np.array([[0.0, 0, 0], [40.0, 0, 0]]), "line")
@@ -86,7 +86,7 @@ class Updates:
     """Counts what the riders' module works out, and how long it takes: live's own calls, unchanged."""
 
     def __enter__(self):
-        self.riders, self.spent, self.cpu = room("scene.ride.riders"), [], []
+        self.riders, self.spent, self.cpu = room("scene.path_editing.riders"), [], []
         self.renew = self.riders.renew
 
         def counted(*arguments, **named):
@@ -169,7 +169,7 @@ def grab(number, start=0.0):
         point.select_control_point = point.select_left_handle = point.select_right_handle = other == number
     place = np.array(drawn().matrix_world @ points()[number].co)
     scene = window.window.scene
-    shown = room("scene.ride.riders").shown(body())
+    shown = room("scene.path_editing.riders").shown(body())
     scene.frame_set(shown.first + int(np.argmin(np.linalg.norm(shown.ridden.origin[:, :2] - place[:2], axis=1))))
     bpy.ops.ed.undo_push(message="before the drag")
     yield 0.5
@@ -190,7 +190,7 @@ def drag(seconds=6.0):
 
 def settled():
     """Wait until live has seen everything, also while a point is held."""
-    live, quiet = room("scene.ride.live"), 0
+    live, quiet = room("scene.path_editing.live"), 0
     start = time.monotonic()
     while quiet < 4:
         assert time.monotonic() - start < 300.0, "live does not come to rest"

@@ -74,7 +74,7 @@ def check_overlays_of_riders_are_made_once():
         run("beyond_mocap.update_path", "EXEC_DEFAULT")
         yield from redrawn(6)
     counted.told("laid anew once")
-    source = room("scene.ride.riders").shown(rider()).source
+    source = room("scene.path_editing.riders").shown(rider()).source
     assert 0 < len(counted.made) <= 3, [key[1:] for key, _ in counted.made]
     assert all(key[0] is not source for key, _ in counted.made), "the original's own shapes were made again"
     within("shapes made anew, s", sum(seconds for _, seconds in counted.made), 0.02)
@@ -140,7 +140,7 @@ def check_the_panel_is_quick():
 def check_figures_come_when_the_curve_is_at_rest():
     yield from a_rider()
     yield from until(lambda: "skate" in rider().beyond_mocap_ride.figures)
-    told = room("scene.ride.figure_lines").lines(rider().beyond_mocap_ride.figures)
+    told = room("scene.path_editing.figure_lines").lines(rider().beyond_mocap_ride.figures)
     output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
     assert "Feet slide" in told and "Off the path" in told
 
@@ -152,7 +152,7 @@ def check_keys_flick_through_the_cameras_and_back():
     own = bpy.data.objects.new("Own", bpy.data.cameras.new("Own"))
     scene.collection.objects.link(own)
     scene.camera = own
-    view, kinds = area.spaces.active.region_3d, room("scene.path_cameras").KINDS
+    view, kinds = area.spaces.active.region_3d, room("scene.stage.path_cameras").KINDS
     yield from window.move(area.x + area.width // 3, area.y + area.height // 2)
     for perspective in ("PERSP", "ORTHO", "CAMERA"):
         view.view_perspective = perspective
@@ -185,7 +185,7 @@ def check_keys_nudge_and_the_rider_follows():
         bpy.ops.ed.undo_push(message="selected")
     yield from window.move(area.x + area.width // 3, area.y + area.height // 2)
     yield 0.5
-    riders, frame = room("scene.ride.riders"), bpy.context.scene.frame_current
+    riders, frame = room("scene.path_editing.riders"), bpy.context.scene.frame_current
     start, laid = tuple(bpy.context.object.data.splines[0].points[4].co), riders.shown(rider()).number
     for count, key in enumerate(("UP_ARROW", "UP_ARROW", "RIGHT_ARROW", "PAGE_UP"), 1):
         yield from window.press(key, alt=True)

@@ -98,8 +98,8 @@ def a_walk_on_a_bend():
     scene = bpy.context.scene
     bpy.ops.beyond_mocap.import_clips(filepath=str(sample() / "library" / "walk_jog_walk.bvh"))
     walker = bpy.context.object
-    motion = room("scene.action").read(walker, scene)
-    person = room("scene.body").create(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
+    motion = room("scene.core.action").read(walker, scene)
+    person = room("scene.stage.body").create(walker, "person", (0.75, 0.05, 0.06), scene.collection, scene, motion)
     for collection in person.users_collection:
         collection.color_tag = "NONE"
     walker.hide_set(False)

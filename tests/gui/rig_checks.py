@@ -38,7 +38,7 @@ def check_bake_to_a_rigify_rig():
     name = rig.name
     settings = scene.beyond_mocap.rig
     settings.source, settings.target = body, rig
-    assert len(room("rig").table_of(settings)) >= 22, settings.told
+    assert len(room("rigs.rig").table_of(settings)) >= 22, settings.told
     bpy.ops.ed.undo_push(message="before the bake")
     yield from press_button("bake_to_rig(targets='CHOSEN'")  # one press is one undo step
     yield from until(lambda: bpy.data.objects[name].animation_data and bpy.data.objects[name].animation_data.action)

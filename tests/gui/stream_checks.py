@@ -26,7 +26,7 @@ def scene():
 
 def send(clip, loop=True):
     """Begin to send a clip; returns what ends it."""
-    sender = room("beyond_mocap.stream.sender").Sender(sample() / clip, PORT, loop=loop)
+    sender = room("beyond_mocap.passes.stream.sender").Sender(sample() / clip, PORT, loop=loop)
     stop = threading.Event()
     thread = threading.Thread(target=sender.run, args=(stop.is_set,))
     thread.start()

@@ -94,11 +94,11 @@ is."""
     busy = [operator.bl_idname for operator in window.window.modal_operators]
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
     busy += [f"scene.{name}.live" for name in ("ride", "aimed", "passes") if room(f"scene.{name}.live").WATCHER.dirty]
-    busy += ["scene.live"] if settings().live and room("scene.live").WATCHER.dirty else []
+    busy += ["scene.result.live"] if settings().live and room("scene.result.live").WATCHER.dirty else []
     thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
     busy += ["scene.throws.live"] if thrown and room("scene.throws.live").WATCHER.dirty else []
-    waits = room("scene.core.live").is_waiting(room("scene.strip_events")._later)
-    return busy + ["scene.strip_events"] * waits
+    waits = room("scene.core.live").is_waiting(room("scene.timeline.strip_events")._later)
+    return busy + ["scene.timeline.strip_events"] * waits
 
 
 def settled(limit=300.0):

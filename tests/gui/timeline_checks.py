@@ -29,7 +29,7 @@ def in_nla():
 def asked():
     """What the first player's strips ask for, as text."""
     scene = bpy.context.scene
-    read = room("scene.strips").read(scene.beyond_mocap.players[0], scene)
+    read = room("scene.timeline.strips").read(scene.beyond_mocap.players[0], scene)
     return room("beyond_mocap.annotation").format_timeline(read)
 
 
@@ -73,7 +73,7 @@ def begin():
 
 def in_order():
     """Nothing is left to be put in order."""
-    return not room("scene.strip_events").put_in_order(bpy.context.scene)
+    return not room("scene.timeline.strip_events").put_in_order(bpy.context.scene)
 
 
 def check_splitting_by_key_and_undo():
@@ -190,7 +190,7 @@ def name_at(text):
     area = nla()
     region = next(region for region in area.regions if region.type == "WINDOW")
     with in_nla():
-        found = next(one for one in room("scene.moment_names").names(bpy.context, region) if one.text == text)
+        found = next(one for one in room("scene.timeline.moment_names").names(bpy.context, region) if one.text == text)
     left, bottom, right, top = found.box
     return found, (int(region.x + (left + right) / 2), int(region.y + (bottom + top) / 2))
 
@@ -198,7 +198,7 @@ def name_at(text):
 def picked():
     """The words of the picked key moment."""
     scene = bpy.context.scene
-    moments = room("scene.strips").moments(scene.beyond_mocap.players[0], scene)
+    moments = room("scene.timeline.strips").moments(scene.beyond_mocap.players[0], scene)
     moment = next((moment for moment in moments if moment.selected), None)
     return " ".join(moment.words) if moment else ""
 
@@ -273,7 +273,7 @@ def check_the_tab_in_the_nla_editor():
         bpy.ops.nla.view_all()
     area = nla()
     yield from window.open_tab(area, TAB)
-    room("scene.strips").set_automatic(bpy.context, bpy.context.scene.beyond_mocap.players[0], room(
+    room("scene.timeline.strips").set_automatic(bpy.context, bpy.context.scene.beyond_mocap.players[0], room(
         "beyond_mocap.annotation").parse_timeline("0 2.4 standing\n8 17 jogging\n17 19.2 walking\n24.2 26.4 running\n"))
     select("jogging dribble")
     with in_nla():
@@ -294,7 +294,7 @@ def check_the_tab_in_the_nla_editor():
 
 def check_many_names_do_not_overlap():
     yield from begin()
-    parse, strips = room("beyond_mocap.annotation").parse_timeline, room("scene.strips")
+    parse, strips = room("beyond_mocap.annotation").parse_timeline, room("scene.timeline.strips")
     words = "".join(
         f"{1 + n / 3:.3f} kick right running low inside {'front' if n % 2 else 'back'}\n" for n in range(80)
     )
@@ -306,7 +306,7 @@ def check_many_names_do_not_overlap():
     yield 0.5
     region = next(region for region in nla().regions if region.type == "WINDOW")
     with in_nla():
-        boxes = [one.box for one in room("scene.moment_names").names(bpy.context, region)]
+        boxes = [one.box for one in room("scene.timeline.moment_names").names(bpy.context, region)]
     window.picture(PICTURES / "timeline-many.png")
     bpy.context.preferences.view.ui_scale = 1.0
     yield 0.5
@@ -325,19 +325,19 @@ def check_names_in_the_dope_sheet():
     region = next(region for region in area.regions if region.type == "WINDOW")
     with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
         bpy.ops.action.view_all()
-        found = room("scene.moment_names").names(bpy.context, region)
+        found = room("scene.timeline.moment_names").names(bpy.context, region)
     yield 0.5
     window.picture(PICTURES / "timeline-dope-sheet.png")
     assert found, "no name is drawn"
     bpy.context.scene.beyond_mocap.show_moment_names = False
     with bpy.context.temp_override(window=window.window, screen=window.window.screen, area=area, region=region):
-        assert not room("scene.moment_names").shown(bpy.context)
+        assert not room("scene.timeline.moment_names").shown(bpy.context)
 
 
 def check_an_automatic_strip_that_is_dragged_is_asked_for():
     yield from begin()
     parse, player = room("beyond_mocap.annotation").parse_timeline, bpy.context.scene.beyond_mocap.players[0]
-    room("scene.strips").set_automatic(bpy.context, player, parse("0 2.4 standing\n8 17 jogging\n"))
+    room("scene.timeline.strips").set_automatic(bpy.context, player, parse("0 2.4 standing\n8 17 jogging\n"))
     bpy.ops.ed.undo_push(message="synthesis")
     before = asked()
     select("jogging")

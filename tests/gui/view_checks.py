@@ -27,7 +27,7 @@ def prepared():
 
 def made(seconds=8.0):
     """The sample with the takes of both players shown, made once for all checks, the playhead near a kick."""
-    session = room("scene.session")
+    session = room("scene.core.session")
     if not settings().players or session.made(settings().players[0].take) is None:
         bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
         yield 1.0

@@ -5,9 +5,9 @@ import json
 import pytest
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.planted_examples import write_planted
+from beyond_mocap.throws.planted_examples import write_planted
 
-from tests.core.test_throw import STICK
+from tests.core.throws.test_throw import STICK
 
 
 @pytest.fixture(scope="module")

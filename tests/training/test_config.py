@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from training.config import TrainingConfig, config_of, read_config
 
 

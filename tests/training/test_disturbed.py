@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.humanoid import heading_from_positions
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.synthesis.phase_network.chains import chains_of
-from beyond_mocap.synthesis.phase_network.example import example_of, poses
-from beyond_mocap.synthesis.phase_network.limits import JointLimits, learn
-from beyond_mocap.synthesis.phase_network.model import ThrowModel
-from beyond_mocap.synthesis.phase_network.one_frame import OneFrame
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.networks.chains import chains_of
+from beyond_mocap.throws.networks.example import example_of, poses
+from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.model import ThrowModel
+from beyond_mocap.throws.networks.one_frame import OneFrame
+from beyond_mocap.throws.networks.training_set import leg_reach, steps
 from training.arrays import ARRAYS
 from training.config import config_of
 from training.disturbed import FACING, PLACE, disturbed, drawn, small_turns

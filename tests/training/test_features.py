@@ -5,13 +5,13 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.synthesis.phase_network.answers import answered, ends, network_output
-from beyond_mocap.synthesis.phase_network.chains import chains_of
-from beyond_mocap.synthesis.phase_network.example import example_of
-from beyond_mocap.synthesis.phase_network.features import network_input, phase_of
-from beyond_mocap.synthesis.phase_network.model import ModelSettings
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, steps
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.networks.answers import answered, ends, network_output
+from beyond_mocap.throws.networks.chains import chains_of
+from beyond_mocap.throws.networks.example import example_of
+from beyond_mocap.throws.networks.features import network_input, phase_of
+from beyond_mocap.throws.networks.model import ModelSettings
+from beyond_mocap.throws.networks.training_set import leg_reach, steps
 
 TARGET = (12.0, 3.0, 1.2)
 CASES = [ModelSettings(guided=True, carried=True), ModelSettings("single", wrist="inferred", frame="static")]

@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.synthesis.phase_network.chains import HIERARCHY, LIMB_OF
-from beyond_mocap.synthesis.phase_network.example import example_of
-from beyond_mocap.synthesis.phase_network.limits import JointLimits, learn
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, shared_chains
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.networks.chains import HIERARCHY, LIMB_OF
+from beyond_mocap.throws.networks.example import example_of
+from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.training_set import leg_reach, shared_chains
 from training.config import config_of
 from training.hierarchy import IK_SHARE, Networks
 from training.recordings import recordings

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import Cancelled, InputError
+from beyond_mocap.base.errors import Cancelled, InputError
 from training import checkpoint
 from training.fit import batches, stretches
 from training.config import config_of

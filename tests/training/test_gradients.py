@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.phase_network import phase_function, phases
-from beyond_mocap.synthesis.phase_network.correct import bend_to
-from beyond_mocap.synthesis.phase_network.network import forward
+from beyond_mocap.throws.networks import phase_function, phases
+from beyond_mocap.throws.networks.correct import bend_to
+from beyond_mocap.throws.networks.network import forward
 
 SIZES = (6, 5, 5, 4)
 STEP = 1e-6

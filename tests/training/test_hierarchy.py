@@ -7,14 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.files.network_npz import read_model, write_model
-from beyond_mocap.motion.throws import throw
-from beyond_mocap.synthesis.phase_network.example import describe, example_of, poses
-from beyond_mocap.synthesis.phase_network.frame_step import Stepper
-from beyond_mocap.synthesis.phase_network.limits import JointLimits, learn
-from beyond_mocap.synthesis.phase_network.model import ThrowModel
-from beyond_mocap.synthesis.phase_network.training_set import leg_reach, shared_chains, steps
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.throws.network_npz import read_model, write_model
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.networks.example import describe, example_of, poses
+from beyond_mocap.throws.networks.frame_step import Stepper
+from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.model import ThrowModel
+from beyond_mocap.throws.networks.training_set import leg_reach, shared_chains, steps
 from training.config import config_of
 from training.fit import fit
 from training.hierarchy import Networks

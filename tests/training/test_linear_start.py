@@ -4,8 +4,8 @@ import jax
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.phase_network import phase_function
-from beyond_mocap.synthesis.phase_network.network import forward
+from beyond_mocap.throws.networks import phase_function
+from beyond_mocap.throws.networks.network import forward
 from training.networks import RIDGES, first_weights, linear_start, sums
 
 ROWS, INPUTS, OUTPUTS = 3000, 6, 3

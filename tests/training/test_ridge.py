@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import Cancelled
+from beyond_mocap.base.errors import Cancelled
 from training import ridge
 from training.networks import RIDGES
 

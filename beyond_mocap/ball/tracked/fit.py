@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.easing import hermite
 from ...base.vectors import unit_vectors
-from ...errors import Cancelled
+from ...base.errors import Cancelled
 from ..batch import courses
 from ..physics import FOOTBALL, Ball
 from .coarse import coarse_courses

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError
-from ...motion.runs import runs
+from ...base.errors import InputError
+from ...base.runs import runs
 from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
 

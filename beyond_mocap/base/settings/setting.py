@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
 
-from ...errors import InputError
+from ..errors import InputError
 
 BETWEEN = "between {least} and {most}"
 WHOLE = "a whole number from {least} to {most}"

@@ -3,7 +3,7 @@
 
 from collections.abc import Iterable
 
-from ...errors import InputError
+from ..errors import InputError
 from .setting import BETWEEN, Setting
 
 METHODS = (

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
 from ...motion.motion import Motion
-from ...motion.runs import runs
+from ...base.runs import runs
 from ..proposal import LEARNED, Proposal
 from . import confidence
 from .act import Act, candidates, in_space, rule_at, rule_sure, steady, struck

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...annotation import LOCOMOTION, VOCABULARY, ClipAnnotation, spoken
 from ...annotation.labels import list_labels
-from ...errors import Cancelled, InputError
+from ...base.errors import Cancelled, InputError
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
 from ..proposals import GAITS, propose
@@ -99,7 +99,7 @@ class _Clips:
 
     def read(self, worded: bool, unit, progress, cancelled) -> Iterator[tuple]:
         """(path below the folder, motion, rows) of all clips that have words, or of those that have none."""
-        from ...files import bvh
+        from ...files.bvh import bvh
 
         for number, path in enumerate(self._paths):
             file = self._conversions.readable(path)

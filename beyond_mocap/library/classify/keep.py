@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ...files.whole import atomic_write
 from .act import Act
 from .classifier import Classifier

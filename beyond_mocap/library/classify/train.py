@@ -13,7 +13,7 @@ import numpy as np
 
 from ...annotation import swap_sides
 from ...annotation.labels import find_label
-from ...errors import InputError
+from ...base.errors import InputError
 from ..proposal import Proposal
 from . import confidence, details, kernel
 from .act import Act, candidates, in_space, rule_at, rule_sure, steady, strike_of
@@ -48,7 +48,7 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
     """
     from threadpoolctl import threadpool_limits
 
-    from ...errors import Cancelled
+    from ...base.errors import Cancelled
 
     wanted = _acts(examples)
     if not wanted:

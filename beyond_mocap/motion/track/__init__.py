@@ -1,6 +1,6 @@
 """A tracked player: samples as a feed delivers them, put right, and brought to an even rate.
 
-    track = files.tracking.read_track_csv("player.csv")
+    track = files.tracking.tracking.read_track_csv("player.csv")
     track, report = clean(track)
     sampled = sample(track, fps=30)
 """

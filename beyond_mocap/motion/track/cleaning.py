@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError, TimedLine, told_time
-from ..runs import runs
+from ...base.errors import InputError, TimedLine, told_time
+from ...base.runs import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
 from .sentinels import at_sentinel

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from ...errors import InputError
+from ...base.errors import InputError
 from ..skeleton import frozen_array
 
 BALL_RADIUS = 0.11

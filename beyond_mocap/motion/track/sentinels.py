@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..runs import runs
+from ...base.runs import runs
 
 _PITCH = 200.0  # metres from the centre beyond which no ball is
 

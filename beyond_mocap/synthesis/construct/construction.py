@@ -21,16 +21,16 @@ from ...annotation.gaze import wanted_offset
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.track import SampledTrack
-from ...own_size import real_ball
-from ...polish.banking import banked, missing_lean
-from ...polish.cross_fade import faded_rotations, faded_values, share
-from ...polish.face_ball import turned_to_ball
-from ...polish.foot_plant import Planted, plant
-from ...polish.give import give
-from ...polish.on_track import facing, firmness, pulled_to_track, root_with_sway
-from ...polish.steps import Steps, steps
-from ...polish.strike import Touch, strike
-from ..footage import Footage, overlap
+from ..own_size import real_ball
+from .banking import banked, missing_lean
+from .cross_fade import faded_rotations, faded_values, share
+from .face_ball import turned_to_ball
+from ...motion.foot_plant import Planted, plant
+from .give import give
+from .on_track import facing, firmness, pulled_to_track, root_with_sway
+from .steps import Steps, steps
+from .ball.strike import Touch, strike
+from ..search.footage import Footage, overlap
 from ..resolved_plan import ResolvedPlan
 from .old_motion import OldMotion
 

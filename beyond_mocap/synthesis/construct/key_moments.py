@@ -7,11 +7,11 @@ import numpy as np
 from ...annotation import spoken
 from ...library.library import Library
 from ...annotation.ball_contact import striking_part
-from ...polish.strike import Touch
-from ...take import KeyResult
-from ..edit_list import EditList
-from ..footage import Shown
-from ..wanted import Wanted, needed
+from .ball.strike import Touch
+from ..take import KeyResult
+from ..search.edit_list import EditList
+from ..search.footage import Shown
+from ..search.wanted import Wanted, needed
 
 OTHERWISE = 0.4
 """Seconds before and after a key moment that nothing in the library shows in which the body comes to the ball and goes

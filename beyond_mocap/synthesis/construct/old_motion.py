@@ -9,8 +9,8 @@ import numpy as np
 from ...motion import quaternion
 from ...motion.track import SampledTrack
 from ...motion.track.sampling import MOVING_SPEED
-from ...polish.meeting import eased
-from ...polish.on_track import pulled_to_track
+from .ball.meeting import eased
+from .on_track import pulled_to_track
 
 MOST_TURN = 1.5 * np.pi
 """Radians that a body may turn on the spot so as to turn the way it did before."""

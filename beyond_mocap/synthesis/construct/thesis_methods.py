@@ -10,13 +10,13 @@ from ...library.library import Library
 from ...motion.humanoid import identify
 from ...motion.motion import pose_kinematics
 from ...motion.track import SampledTrack
-from ...polish.foot_plant import Planted
-from ...polish.joining import chained_facing, chained_root, torso_corrections
-from ...polish.on_track import facing, root_with_sway
-from ...polish.smoothing import spread_rotations, spread_values
-from ...polish.steps import Steps
-from ..footage import Footage
-from ..locomotion import travelled_distance
+from ...motion.foot_plant import Planted
+from .joining import chained_facing, chained_root, torso_corrections
+from .on_track import facing, root_with_sway
+from .smoothing import spread_rotations, spread_values
+from .steps import Steps
+from ..search.footage import Footage
+from ..search.locomotion import travelled_distance
 from ..resolved_plan import ResolvedPlan
 from .construction import Construction, apply_heading
 

@@ -11,20 +11,20 @@ import pytest
 
 from beyond_mocap.annotation import VOCABULARY, labels
 from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 
 TOP = pathlib.Path(__file__).parents[3]
 TOE_POKE = "toe_poke,toe poke,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/motion/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
-    "beyond_mocap/ball/tracked/planted.py", "beyond_mocap/library/made.py", "beyond_mocap/planted_examples.py",
+    "beyond_mocap/synthetic/ground_truth/planted.py", "beyond_mocap/library/made.py", "beyond_mocap/throws/planted_examples.py",
 }  # fmt: skip
 ALLOWED = {
-    "beyond_mocap/ball/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
+    "beyond_mocap/passes/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
     "beyond_mocap/library/landings.py": "is about getting up",
-    "beyond_mocap/files/events.py": "providers' kinds of events",
-    "beyond_mocap/match/pool.py": "a cluster that is running",
+    "beyond_mocap/files/events/events.py": "providers' kinds of events",
+    "beyond_mocap/match/pieces/pool.py": "a cluster that is running",
     "beyond_mocap/library/one_skeleton.py": "arguments by name",
 }
 DOES = ("act", "action")
@@ -91,12 +91,12 @@ from beyond_mocap import known_touches
 from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, parse_timeline, spoken, validate, words_below
 from beyond_mocap.annotation.ball_contact import may_use_foot, surfaces
 from beyond_mocap.annotation.decision import Walk, choose, options
-from beyond_mocap.ball.strike_choice import _rank, _SAID
+from beyond_mocap.passes.strike_choice import _rank, _SAID
 from beyond_mocap.library.classify.examples import act_of
 from beyond_mocap.library.keys import Key, nearest_serving
 from beyond_mocap.annotation import ClipAnnotation
-from beyond_mocap.motion.adult import adult_skeleton
-from beyond_mocap.plan import Touched
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.synthesis.plan import Touched
 
 words = ("toe_poke", "right")
 timeline = parse_timeline("2.0 toe_poke right low", "a.txt", 30.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from beyond_mocap.ball.aim import _step, aim, along_ground, out_of_reach
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.physics import BALLS, FASTEST, FOOTBALL, PAPER, TENNIS, length
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 
 
 def aims(count, seed=0):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.physics import BALLS, FOOTBALL, PAPER, TENNIS, Ball, bounced, energy, slip
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 
 VACUUM = Ball("vacuum", 0.11, 0.43, gravity=9.8, restitution=0.7)

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.physics import FOOTBALL, PAPER
 from beyond_mocap.ball.shot import Strikes, shoot, spins
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 
 
 def swing(count=9):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
-from beyond_mocap.evaluation import evaluate, played_from_take
+from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
 from beyond_mocap.evaluation.view import View
 

@@ -9,11 +9,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
-from beyond_mocap.errors import InputError
-from beyond_mocap.evaluation import evaluate, evaluate_played, played_from_tables, played_from_take, table
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.evaluation.report import evaluate, evaluate_played, table
+from beyond_mocap.synthesis.quality.played import played_from_tables, played_from_take
 from beyond_mocap.evaluation.figures import filled_timeline
 from beyond_mocap.evaluation.report import flat
-from beyond_mocap.files import bvh, tables
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.files import tables
 from beyond_mocap.library.library import Gait
 from beyond_mocap.library.made import MADE_FOLDER
 from beyond_mocap.motion.motion import at_frames

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from benchmarks.touch_score import Reading, ReadTouch, read_touches, scored, scored_by_events
 
 READ = Reading(

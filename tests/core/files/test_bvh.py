@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.files import bvh, bvh_text
-from beyond_mocap.files.bvh_form import BvhForm
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.bvh import bvh, bvh_text
+from beyond_mocap.files.bvh.bvh_form import BvhForm
+from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading
 from beyond_mocap.motion.motion import end_positions, forward_kinematics
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.obj import read_mesh
 
 SQUARE = "v 0 1 0\nv 2 1 0\nv 2 1 -3\nv 0 1 -3\n"

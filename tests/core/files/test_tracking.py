@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 from provider_tables import PAGE, with_tables
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.errors import InputError
-from beyond_mocap.files import tracking
-from beyond_mocap.files.feed import TrackingProvider
-from beyond_mocap.files.providers import PROVIDERS
-from beyond_mocap.files.tracking import read_match, read_track_csv
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.tracking import tracking
+from beyond_mocap.files.tracking.feed import TrackingProvider
+from beyond_mocap.files.tracking.providers import PROVIDERS
+from beyond_mocap.files.tracking.tracking import read_match, read_track_csv
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data" / "tracking"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="the recordings in ../shared/data are not here")

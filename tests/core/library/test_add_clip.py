@@ -2,10 +2,10 @@
 
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.add_clip import add_clip
 from beyond_mocap.library.build import build
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.synthetic.gait import gait
 
 
 @pytest.fixture

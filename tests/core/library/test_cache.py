@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import cache
 from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build

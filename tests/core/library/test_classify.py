@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
-from beyond_mocap.errors import Cancelled, InputError
-from beyond_mocap.files import bvh
+from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.classify import confidence, keep, train
 from beyond_mocap.library.classify.examples import Example, act_of
 from beyond_mocap.library.classify.signals import signals
 from beyond_mocap.library.classify.train import trained
 from beyond_mocap.library.classify.windows import LENGTH, windows
 from beyond_mocap.library.proposals import propose
-from beyond_mocap.motion.adult import adult_skeleton
-from beyond_mocap.motion.gait import gait
-from beyond_mocap.motion.gestures import strike
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place, resample
-from beyond_mocap.motion.volleys import volley
+from beyond_mocap.synthetic.volleys import volley
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mocap"
 LEARNED = {

@@ -5,7 +5,7 @@ import shutil
 
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.cache import place
 from beyond_mocap.library.converted import Conversions, stamp_of
 from beyond_mocap.library.build import build

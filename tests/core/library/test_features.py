@@ -14,7 +14,7 @@ from beyond_mocap.library.features import (
     sampled_positions,
 )
 from beyond_mocap.library.clip import Clip
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import place
 

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import keep_words
 from beyond_mocap.library.scan import Annotations
 

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation, spoken
 from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
 from beyond_mocap.library.clip import Clip
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.synthetic.gait import gait
 
 
 def key(words, clip=0):

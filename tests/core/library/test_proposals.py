@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.annotation import clip_annotations, parse_timeline, read_clip_annotations
 from beyond_mocap.annotation.text import format_timeline
-from beyond_mocap.files import bvh
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.keep_words import as_timeline
 from beyond_mocap.library.proposals import GAITS, propose
 from beyond_mocap.motion.mirror import mirror

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.files import bvh
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import repair
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.motion.gait import gait
-from beyond_mocap.motion.gestures import strike
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics, resample
 

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.scan import Annotations, find_clips
 
 HEADER = "file,fps,start_frame,end_frame,key_frame,labels,comment\n"

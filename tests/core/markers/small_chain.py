@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from beyond_mocap.markers.chain import Chain, chain, poses
+from beyond_mocap.markers.pose.chain import Chain, chain, poses
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.skeleton import Skeleton
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError, spans_of
-from beyond_mocap.files.marker_set_text import chosen_set
-from beyond_mocap.markers.assemble import model_from_frame
+from beyond_mocap.base.errors import InputError, spans_of
+from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.model.assemble import model_from_frame
 from beyond_mocap.markers.checks import check, unused
-from beyond_mocap.markers.planted import planted
-from beyond_mocap.markers.planted_faults import mirrored
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import planted
+from beyond_mocap.synthetic.ground_truth.planted_faults import mirrored
+from beyond_mocap.synthetic.gait import gait
 
 SET = chosen_set("plug_in_gait")
 

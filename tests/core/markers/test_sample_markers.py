@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.files.marker_files import read_markers
+from beyond_mocap.markers.files.marker_files import read_markers
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 sys.path.insert(0, str(SAMPLE))

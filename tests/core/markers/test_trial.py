@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.trial import MarkerEvent, MarkerTrial
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from beyond_mocap.__main__ import main
-from beyond_mocap.commands.matching import without
+from beyond_mocap.cli.matching import without
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL
 
@@ -160,7 +160,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"out": str(SMALL)}, 2, "holds other files"),
 ])  # fmt: skip
 def test_what_is_wrong_is_told_in_one_line(match, tmp_path, monkeypatch, options, status, told):
-    from beyond_mocap.match import pool
+    from beyond_mocap.match.pieces import pool
 
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(pool, "_ANSWERS", "500ms")

@@ -7,9 +7,9 @@ import time
 
 import pytest
 
-from beyond_mocap.errors import Cancelled, InputError
-from beyond_mocap.match import pool
-from beyond_mocap.match.pool import Failed, Workplace, run
+from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.match.pieces import pool
+from beyond_mocap.match.pieces.pool import Failed, Workplace, run
 
 
 def numbers(count, *more):

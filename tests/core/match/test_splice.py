@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.match.library_clips import bound, named
-from beyond_mocap.match.named_edit import NamedEdit, NamedKey, chained, part, retabled, table
-from beyond_mocap.match.splice import spliced
-from beyond_mocap.match.units import units_of
-from beyond_mocap.synthesis.edit_list import find_seams
-from beyond_mocap.synthesize import synthesize
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.match.pieces.library_clips import bound, named
+from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey, chained, part, retabled, table
+from beyond_mocap.match.pieces.splice import spliced
+from beyond_mocap.match.pieces.units import units_of
+from beyond_mocap.synthesis.search.edit_list import find_seams
+from beyond_mocap.synthesis.synthesize import synthesize
 
 from .conftest import KICK_TIME
 

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build
-from beyond_mocap.match.variety import APART, in_step, lags, share_in_step
+from beyond_mocap.match.crowd.variety import APART, in_step, lags, share_in_step
 from beyond_mocap.motion.track import Track
-from beyond_mocap.plan import Plan
-from beyond_mocap.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.variety import LIKED, PERIOD, taste
-from beyond_mocap.synthesis.wanted import build_order
-from beyond_mocap.synthesize import synthesize
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.search.variety import LIKED, PERIOD, taste
+from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.synthesize import synthesize
 
 
 def test_in_step_needs_the_same_clip_place_and_neighbourhood():

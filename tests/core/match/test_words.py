@@ -7,16 +7,16 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import validate
 from beyond_mocap.annotation.event_words import TABLE, read_event_words
-from beyond_mocap.ball.tracked.planted import planted_match
-from beyond_mocap.ball.tracked.planted_feed import sampled
+from beyond_mocap.synthetic.ground_truth.planted import planted_match
+from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
 from beyond_mocap.ball.tracked.solve import SolvedTouch
-from beyond_mocap.errors import InputError
-from beyond_mocap.files.match_data import Match, MatchPlayer, Team
-from beyond_mocap.match.words import (
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
+from beyond_mocap.match.labels.words import (  # fmt: skip
     LEAST_CONFIDENCE, NEAREST, TOUCHES, USER, Moment, apart, dribbles, moment_of, timeline_of, words_of,
-)  # fmt: skip
-from beyond_mocap.match.words_text import edited, read_words, write_words
-from beyond_mocap.solve_ball import solve_ball
+)
+from beyond_mocap.match.labels.words_text import edited, read_words, write_words
+from beyond_mocap.ball.solve_ball import solve_ball
 
 
 def match_of(feed):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.arc_length import ArcLength
-from beyond_mocap.motion.path import Path, PolynomialPath, SplinePath
+from beyond_mocap.motion.path.arc_length import ArcLength
+from beyond_mocap.motion.path.path import Path, PolynomialPath, SplinePath
 
 LEGENDRE = np.polynomial.legendre
 

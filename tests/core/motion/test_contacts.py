@@ -6,14 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.files import bvh
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.motion.adult import adult_skeleton
-from beyond_mocap.motion.gait import GaitStyle, footsteps, gait, plan
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.synthetic.gait import GaitStyle, footsteps, gait, plan
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.motion.neutral import neutral_stance
+from beyond_mocap.motion.retargeting.neutral import neutral_stance
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 

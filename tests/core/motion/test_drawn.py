@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.track.drawn import HZ, along, moved
 
 STRAIGHT = np.column_stack([np.linspace(0.0, 20.0, 201), np.zeros(201)])

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.files import bvh
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.gait import gait
+from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, end_positions, forward_kinematics

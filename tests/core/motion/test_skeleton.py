@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.skeleton import Skeleton
 
 ARM = Skeleton(("root", "upper", "lower"), (-1, 0, 1), [[0, 0, 0], [0, 0, 0.3], [0, 0, 0.25]], (2,), [[0, 0, 0.2]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BSpline
 
-from beyond_mocap.motion.smooth_spline import smoothing_spline, spline_within
+from beyond_mocap.motion.path.smooth_spline import smoothing_spline, spline_within
 
 AT = np.sort(np.random.default_rng(5).uniform(0.0, 6.0, 200))
 VALUES = np.stack([np.sin(AT), np.cos(1.7 * AT), AT**2], axis=1) + np.random.default_rng(6).normal(size=(200, 3))

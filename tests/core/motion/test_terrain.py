@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.errors import InputError
-from beyond_mocap.motion.terrain import Terrain
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.motion.path.terrain import Terrain
 
 
 def mesh(height, low=-10.0, high=10.0, count=41):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.errors import InputError
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.track import BALL_RADIUS, Track, clean, sample, travel_direction, zero_phase_hann
 
 DATA = pathlib.Path(__file__).resolve().parents[3] / ".." / "shared" / "data"

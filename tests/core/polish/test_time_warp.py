@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.synthesis.distance import catch_up, warp
+from beyond_mocap.synthesis.search.distance import catch_up, warp
 
 WAYS = st.lists(st.floats(0.0, 0.4), min_size=2, max_size=60).map(
     lambda steps: np.concatenate([[0.0], np.cumsum(steps)])

@@ -2,9 +2,9 @@
 
 import pytest
 
-from beyond_mocap.plan import Plan
-from beyond_mocap.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.wanted import build_order
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.search.wanted import build_order
 
 
 @pytest.fixture(scope="session")

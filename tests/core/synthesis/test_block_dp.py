@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.synthesis.blocks import cheapest_path
+from beyond_mocap.synthesis.search.blocks import cheapest_path
 
 COSTS = st.integers(-9, 9)
 

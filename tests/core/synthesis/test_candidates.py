@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.path_costs import cheapest
+from beyond_mocap.synthesis.search.path_costs import cheapest
 
 
 def costs_of(missed, seed=1):

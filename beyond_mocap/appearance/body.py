@@ -1,0 +1,431 @@
+"""A low-poly soccer player that fits any humanoid skeleton: shirt, shorts, socks, boots, head, hands, with skin
+weights.
+
+Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the
+body faces +X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two
+joints share a ring); hips, shoulders and ankles are rounded ends that overlap, which stays whole at any angle and in
+any rest pose. Girths are those of a slim adult of 1.80 m, scaled with the skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..motion import quaternion
+from ..motion.retargeting.adult import LEG
+from ..motion.humanoid import Humanoid, Limb, identify
+from ..motion.motion import Motion
+from ..motion.retargeting.neutral import Neutral, neutral_stance, rests_upright
+from ..motion.skeleton import Skeleton, frozen_array
+
+MATERIALS = ("skin", "shirt", "shorts", "socks", "boots", "hair")
+SKIN, SHIRT, SHORTS, SOCKS, BOOTS, HAIR = range(6)
+
+
+@dataclass(frozen=True, eq=False)
+class BodyMesh:
+    """A closed mesh with weights, in the skeleton's rest pose (no joint rotated, root at the origin).
+
+    vertices (V, 3): metres, Z up. faces: tuples of 3 or 4 vertex indices, counter-clockwise from outside. joints (V,
+    2), weights (V, 2): the two joints a vertex follows and how much, summing to 1 (the second weight may be 0).
+    material (F,): index into MATERIALS per face."""
+
+    vertices: np.ndarray
+    faces: tuple[tuple[int, ...], ...]
+    joints: np.ndarray
+    weights: np.ndarray
+    material: np.ndarray
+
+
+def low_poly_body(skeleton: Skeleton, height: float | None = None, example: Motion | None = None) -> BodyMesh:
+    """A player's body for `skeleton`; `height`: stature in metres that girths belong to, default by the legs' length.
+
+    example: any recording on the skeleton; it tells how bones are twisted where the rest pose is no standing one,
+    without it feet and hands of such skeletons may sit turned (see `neutral.neutral_stance`). The face looks ahead as
+    the rest pose does, where that stands upright. Raises InputError where hips or legs cannot be found."""
+    neutral = neutral_stance(skeleton, example)
+    if example is not None and rests_upright(skeleton):
+        neutral = _level_head(neutral, neutral_stance(skeleton))
+    build = _Build(neutral, identify(skeleton), neutral.leg / LEG if height is None else height / 1.80)
+    build.torso()
+    build.head()
+    for side, limb in ((1.0, build.body.left), (-1.0, build.body.right)):
+        build.leg(limb)
+        build.boot(limb, side)
+        if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
+            build.arm(limb)
+            build.hand(limb, side)
+    vertices, joints, weights = (np.concatenate(rows) for rows in (build.vertices, build.joints, build.weights))
+    rest = _to_rest(neutral, vertices, joints, weights)
+    arrays = (frozen_array(rest), tuple(build.faces), frozen_array(joints, int), frozen_array(weights))
+    return BodyMesh(*arrays, frozen_array(build.material, int))
+
+
+def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
+    """The stance with its head as it rests, unless that would have the example's people look up: who kicks or walks
+    looks down at the ground ahead, but some suits rest with a bowed head."""
+    carrier = identify(neutral.skeleton).head_or_neck
+    ahead = quaternion.multiply(neutral.rotations[carrier], quaternion.inverse(rest.rotations[carrier]))
+    if quaternion.rotate(ahead, np.array([1.0, 0.0, 0.0]))[2] > 0.0:
+        return neutral
+    rotations = np.array(neutral.rotations)
+    rotations[carrier] = rest.rotations[carrier]
+    return replace(neutral, rotations=rotations)
+
+
+def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
+    """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (...,
+    J, 4).
+
+    Linear blend skinning, as Blender's armature modifier does without volume preservation.
+    """
+    origin = skeleton.rest_positions
+    out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
+    for column in range(2):
+        joint = body.joints[:, column]
+        moved = quaternion.rotate(world[..., joint, :], body.vertices - origin[joint]) + places[..., joint, :]
+        out += body.weights[:, column, None] * moved
+    return out
+
+
+def _to_rest(neutral: Neutral, vertices: np.ndarray, joints: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The rest position (V, 3) of vertices (V, 3) of the neutral stance: blend skinning turned round."""
+    origin = neutral.skeleton.rest_positions
+    turn = quaternion.to_matrix(neutral.rotations)
+    shift = neutral.positions - np.einsum("jab,jb->ja", turn, origin)
+    matrix = np.einsum("vc,vcab->vab", weights, turn[joints])
+    torn = np.abs(np.linalg.det(matrix)) < 0.2  # two joints that rest in opposite directions: follow the first alone
+    matrix[torn] = turn[joints[torn, 0]]
+    offset = np.einsum("vc,vca->va", weights, shift[joints])
+    offset[torn] = shift[joints[torn, 0]]
+    return np.linalg.solve(matrix, (vertices - offset)[..., None])[..., 0]
+
+
+class _Build:
+    """Collects the parts. Tables are in metres for a stature of 1.80 m; `scale` fits them to the skeleton."""
+
+    def __init__(self, neutral: Neutral, body: Humanoid, scale: float):
+        self.neutral, self.body, self.scale = neutral, body, scale
+        self.vertices, self.joints, self.weights = [], [], []
+        self.faces: list[tuple[int, ...]] = []
+        self.material: list[int] = []
+
+    def at(self, joint: int) -> np.ndarray:
+        return self.neutral.positions[joint]
+
+    def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
+        """A closed tube. rings: rows (centre (3,), radius along the first axis, along the second). follows: per ring
+        (joint, joint, share of the second). materials: one per gap between rings, the first and last also for the
+        caps."""
+        first, second = (np.array(axis, dtype=float) for axis in across)
+        angle = 2.0 * np.pi * np.arange(sides) / sides
+        circle = np.cos(angle)[:, None, None] * first, np.sin(angle)[:, None, None] * second
+        start = sum(len(v) for v in self.vertices)
+        centres = np.array([ring[0] for ring in rings])
+        radii = np.array([ring[1:3] for ring in rings]) * self.scale
+        points = (centres[None] + circle[0] * radii[None, :, :1] + circle[1] * radii[None, :, 1:]).transpose(1, 0, 2)
+        bottom, top = centres[0], centres[-1]
+        self.vertices.append(np.concatenate([points.reshape(-1, 3), [bottom, top]]))
+        pairs = np.array([f[:2] for f in follows])
+        shares = np.array([(1.0 - f[2], f[2]) for f in follows])
+        self.joints.append(np.concatenate([np.repeat(pairs, sides, axis=0), pairs[[0, -1]]]))
+        self.weights.append(np.concatenate([np.repeat(shares, sides, axis=0), shares[[0, -1]]]))
+        self._skin(start, len(rings), sides, materials, np.dot(np.cross(first, second), top - bottom) > 0)
+
+    def _skin(self, start: int, count: int, sides: int, materials, outward: bool) -> None:
+        index = start + np.arange(count * sides).reshape(count, sides)
+        low, high = start + count * sides, start + count * sides + 1
+        for i in range(sides):
+            j = (i + 1) % sides
+            quads = [
+                ((index[r, i], index[r, j], index[r + 1, j], index[r + 1, i]), materials[r]) for r in range(count - 1)
+            ]
+            caps = [
+                ((index[0, j], index[0, i], low), materials[0]),
+                ((index[-1, i], index[-1, j], high), materials[-1]),
+            ]
+            for face, material in quads + caps:
+                self.faces.append(tuple(int(v) for v in (face if outward else face[::-1])))
+                self.material.append(material)
+
+    def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
+        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half and half with `other` where
+        given."""
+        rings = [
+            (centre + self.scale * np.array([0, 0, -radii[2] * np.cos(a)]), radii[0] * np.sin(a), radii[1] * np.sin(a))
+            for a in np.radians([25, 55, 90, 125, 155])
+        ]
+        follow = (joint, joint, 0.0) if other is None else (joint, other, 0.5)
+        self.tube(rings, [follow] * 5, [material] * 4, sides)
+
+    # -- trunk and head
+    # -------------------------------------------------------------------------------------------------
+
+    def spine_follow(self, height: float) -> tuple[int, int, float]:
+        """Which two joints of the spine a ring at `height` metres follows: half and half at a joint, one between."""
+        chain = [self.body.hips]
+        for joint in self.body.spine:
+            if self.at(joint)[2] > self.at(chain[-1])[2] + 0.02:
+                chain.append(joint)
+        levels = np.array([self.at(j)[2] for j in chain[1:]])
+        position = np.interp(height, *_half_way(levels)) if len(levels) else 0.0
+        low = int(np.clip(np.floor(position), 0, max(len(chain) - 2, 0)))
+        high = min(low + 1, len(chain) - 1)
+        return chain[low], chain[high], float(np.clip(position - low, 0.0, 1.0))
+
+    def torso(self) -> None:
+        body, k = self.body, self.scale
+        hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
+        top, half = self._shoulders(hip)
+        # share of the way hip joints -> shoulder joints, forward shift, half depth, half width
+        shirt = (
+            (0.13, 0.000, 0.112, 0.158),
+            (0.22, 0.002, 0.112, 0.156),
+            (0.36, 0.006, 0.107, 0.146),
+            (0.52, 0.006, 0.112, 0.152),
+            (0.68, 0.004, 0.122, 0.168),
+            (0.82, -0.002, 0.124, 0.178),
+            (0.92, -0.006, 0.114, 0.182),
+            (1.00, -0.010, 0.094, 0.180),
+            (1.055, -0.014, 0.080, 0.150),
+            (1.10, -0.016, 0.070, 0.104),
+            (1.145, -0.016, 0.060, 0.068),
+        )
+        self._trunk_rings(hip, top, shirt, SHIRT, half / (0.164 * k))
+        shorts = (
+            (-0.17, 0.0, 0.05, 0.06),
+            (-0.14, 0.0, 0.092, 0.118),
+            (-0.06, -0.004, 0.116, 0.158),
+            (0.03, -0.006, 0.122, 0.168),
+            (0.12, -0.002, 0.116, 0.162),
+            (0.205, 0.0, 0.108, 0.152),
+        )
+        self._trunk_rings(hip, top, shorts, SHORTS, 1.0)
+
+    def _shoulders(self, hip: np.ndarray) -> tuple[np.ndarray, float]:
+        """Middle of the shoulder joints and half their distance; guessed from the spine where there are no arms."""
+        arms = [limb.upper_arm for limb in (self.body.left, self.body.right)]
+        if None in arms:
+            return hip + np.array([0.0, 0.0, 0.56 * self.scale]), 0.164 * self.scale
+        left, right = self.at(arms[0]), self.at(arms[1])
+        middle = 0.5 * (left + right)
+        return middle, 0.5 * abs(left[1] - right[1])
+
+    def _trunk_rings(self, hip, top, table, material: int, widen: float) -> None:
+        rings, follows = [], []
+        for share, ahead, depth, width in table:
+            upper = max(share - 0.5, 0.0) / 0.5
+            centre = hip + share * (top - hip) + np.array([ahead * self.scale, 0.0, 0.0])
+            rings.append((centre, depth, width * (1.0 + upper * (widen - 1.0) * (share < 1.05))))
+            follows.append(self.spine_follow(centre[2]))
+        self.tube(rings, follows, [material] * (len(rings) - 1), 16)
+
+    def head(self) -> None:
+        body, k = self.body, self.scale
+        hip = 0.5 * (self.at(body.left.upper_leg) + self.at(body.right.upper_leg))
+        shoulder, _ = self._shoulders(hip)
+        carrier = body.head_or_neck
+        neck = body.neck_or_chest
+        base = self.at(carrier) if body.head is not None else shoulder + k * np.array([0.03, 0.0, 0.15])
+        low = shoulder + k * np.array([-0.012, 0.0, 0.03])
+        rings = [(low, 0.066, 0.072)]
+        rings += [(low + share * (base - low), *girth) for share, *girth in ((0.45, 0.056, 0.058), (0.8, 0.054, 0.054))]
+        rings += [(base + k * np.array([0.0, 0.0, 0.03]), 0.052, 0.052)]
+        self.tube(
+            rings,
+            [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)],
+            [SKIN] * 3,
+            12,
+        )
+        self._face(base, carrier)
+
+    def _face(self, base: np.ndarray, joint: int) -> None:
+        k = self.scale
+        # above the base of the skull, forward, half depth, half width
+        skull = (
+            (-0.072, 0.060, 0.022, 0.022),
+            (-0.062, 0.052, 0.042, 0.038),
+            (-0.038, 0.036, 0.064, 0.054),
+            (-0.005, 0.022, 0.082, 0.066),
+            (0.035, 0.014, 0.094, 0.073),
+            (0.075, 0.010, 0.097, 0.075),
+            (0.110, 0.006, 0.088, 0.068),
+            (0.137, 0.002, 0.062, 0.049),
+            (0.151, 0.000, 0.030, 0.024),
+        )
+        hair = (
+            (-0.020, -0.046, 0.040, 0.058),
+            (0.010, -0.030, 0.066, 0.072),
+            (0.050, -0.020, 0.080, 0.079),
+            (0.085, -0.010, 0.090, 0.080),
+            (0.106, 0.002, 0.098, 0.076),
+            (0.128, 0.003, 0.082, 0.064),
+            (0.150, 0.001, 0.054, 0.043),
+            (0.161, -0.002, 0.022, 0.018),
+        )
+        for table, material in ((skull, SKIN), (hair, HAIR)):
+            rings = [(base + k * np.array([ahead, 0.0, up]), depth, width) for up, ahead, depth, width in table]
+            self.tube(rings, [(joint, joint, 0.0)] * len(rings), [material] * (len(rings) - 1), 14)
+        self.ball(base + k * np.array([0.112, 0.0, 0.016]), (0.017, 0.011, 0.020), joint, SKIN, sides=6)
+        for side in (1.0, -1.0):
+            self.ball(base + k * np.array([0.010, side * 0.073, 0.022]), (0.016, 0.009, 0.026), joint, SKIN, sides=6)
+            self.ball(base + k * np.array([0.0975, side * 0.028, 0.042]), (0.008, 0.011, 0.006), joint, HAIR, sides=6)
+            self.ball(base + k * np.array([0.0985, side * 0.029, 0.061]), (0.007, 0.017, 0.0045), joint, HAIR, sides=6)
+
+    # -- limbs
+    # ----------------------------------------------------------------------------------------------------------
+
+    def limb_tube(self, upper: int, lower: int, end: int, table, sides: int) -> None:
+        """A tube along two bones. table: rows (place, metres forward, metres left, radii, material): places 0..1 run
+        down the upper bone, 1..2 down the lower one; rings near the middle joint are shared, the last ones follow the
+        lower bone."""
+        a, b, c = self.at(upper), self.at(lower), self.at(end)
+        rings, follows = [], []
+        for place, ahead, left, first, second, _ in table:
+            centre = a + (b - a) * min(place, 1.0) + (c - b) * max(place - 1.0, 0.0)
+            rings.append((centre + self.scale * np.array([ahead, left, 0.0]), first, second))
+            follows.append((upper, lower, float(np.clip(0.5 + (place - 1.0) / 0.34, 0.0, 1.0))))
+        self.tube(rings, follows, [row[-1] for row in table[:-1]], sides)
+
+    def leg(self, limb: Limb) -> None:
+        inner = -np.sign(self.at(limb.upper_leg)[1])
+        bones = limb.upper_leg, limb.lower_leg, limb.foot
+        table = (
+            (0.16, 0.004, 0.0, 0.082, 0.076, SKIN),
+            (0.40, 0.006, 0.0, 0.079, 0.073, SKIN),
+            (0.62, 0.005, 0.0, 0.070, 0.065, SKIN),
+            (0.80, 0.002, 0.0, 0.060, 0.058, SKIN),
+            (0.90, 0.004, 0.0, 0.057, 0.055, SKIN),
+            (0.97, 0.006, 0.0, 0.057, 0.053, SKIN),
+            (1.04, 0.004, 0.0, 0.055, 0.051, SKIN),
+            (1.12, -0.002, 0.0, 0.053, 0.050, SKIN),
+            (1.155, -0.004, 0.0, 0.053, 0.051, SKIN),
+            (1.16, -0.006, 0.0, 0.058, 0.056, SOCKS),
+            (1.30, -0.012, 0.004 * inner, 0.061, 0.058, SOCKS),
+            (1.45, -0.010, 0.003 * inner, 0.055, 0.052, SOCKS),
+            (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS),
+            (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS),
+            (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS),
+            (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
+        )
+        self.limb_tube(*bones, table, 12)
+        self.ball(
+            self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]),
+            (0.054, 0.050, 0.056),
+            bones[0],
+            SKIN,
+            bones[1],
+        )
+        self.ball(self.at(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
+        shorts = (
+            (-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS),
+            (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
+            (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS),
+            (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
+            (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS),
+            (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
+            (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS),
+            (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS),
+        )
+        self.limb_tube(*bones, shorts, 12)
+
+    def boot(self, limb: Limb, side: float) -> None:
+        ankle, k = self.at(limb.foot), self.scale
+        ball = self.neutral.ball[0 if side > 0 else 1]
+        floor = ankle[2] - self.neutral.ankle_height
+        toe = limb.toe if limb.toe is not None else limb.foot
+        # metres from the ankle (or, from the ball on, from the toe joint), height of the middle, half height, half
+        # width
+        table = (
+            (-0.068, 0.040, 0.024, 0.018, 0),
+            (-0.060, 0.042, 0.040, 0.030, 0),
+            (-0.030, 0.046, 0.046, 0.036, 0),
+            (0.010, 0.049, 0.049, 0.037, 0),
+            (0.050, 0.040, 0.040, 0.039, 0),
+            (0.090, 0.032, 0.032, 0.043, 0),
+            (0.000, 0.027, 0.027, 0.047, 0.5),
+            (0.028, 0.024, 0.023, 0.045, 1),
+            (0.055, 0.021, 0.018, 0.036, 1),
+            (0.072, 0.018, 0.011, 0.022, 1),
+        )
+        rings, follows = [], []
+        for row, (ahead, up, high, wide, share) in enumerate(table):
+            x = ankle[0] + (k * ahead if row < 6 else ball[0] + k * ahead)
+            if row == 5:
+                x = min(x, ankle[0] + 0.72 * ball[0])
+            rings.append((np.array([x, ankle[1] + side * 0.004 * k, floor + k * up]), wide, high))
+            follows.append((limb.foot, toe, float(share)))
+        self.tube(rings, follows, [BOOTS] * (len(rings) - 1), 10, ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+    def arm(self, limb: Limb) -> None:
+        inner = -np.sign(self.at(limb.upper_arm)[1])
+        bones = limb.upper_arm, limb.lower_arm, limb.hand
+        table = (
+            (0.30, 0.0, 0.0, 0.046, 0.044, SKIN),
+            (0.55, 0.003, 0.0, 0.046, 0.043, SKIN),
+            (0.78, 0.002, 0.0, 0.041, 0.039, SKIN),
+            (0.90, 0.0, 0.0, 0.039, 0.038, SKIN),
+            (0.97, -0.002, 0.0, 0.039, 0.038, SKIN),
+            (1.04, -0.001, 0.0, 0.039, 0.038, SKIN),
+            (1.14, 0.003, 0.0, 0.041, 0.039, SKIN),
+            (1.35, 0.003, 0.0, 0.039, 0.036, SKIN),
+            (1.65, 0.001, 0.0, 0.032, 0.028, SKIN),
+            (1.90, 0.0, 0.0, 0.028, 0.022, SKIN),
+            (2.04, 0.0, 0.0, 0.026, 0.020, SKIN),
+        )
+        self.limb_tube(*bones, table, 10)
+        self.ball(
+            self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]),
+            (0.038, 0.036, 0.04),
+            bones[0],
+            SKIN,
+            bones[1],
+        )
+        sleeve = (
+            (-0.165, 0.0, 0.020 * inner, 0.024, 0.024, SHIRT),
+            (-0.14, 0.0, 0.016 * inner, 0.044, 0.042, SHIRT),
+            (-0.07, 0.0, 0.008 * inner, 0.060, 0.056, SHIRT),
+            (0.06, 0.0, 0.0, 0.067, 0.060, SHIRT),
+            (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT),
+            (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
+            (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT),
+            (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT),
+        )
+        self.limb_tube(*bones, sleeve, 12)
+
+    def hand(self, limb: Limb, side: float) -> None:
+        wrist, k, joint = self.at(limb.hand), self.scale, limb.hand
+        # below the wrist, towards the palm, forward, half length along the palm's width, half thickness
+        table = (
+            (-0.022, 0.0, 0.0, 0.024, 0.019),
+            (0.010, 0.0, 0.0, 0.031, 0.018),
+            (0.050, 0.002, 0.002, 0.042, 0.019),
+            (0.092, 0.008, 0.002, 0.043, 0.018),
+            (0.124, 0.020, 0.000, 0.038, 0.017),
+            (0.148, 0.038, -0.002, 0.033, 0.015),
+            (0.156, 0.058, -0.002, 0.027, 0.012),
+        )
+        rings = [
+            (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
+            for down, palm, ahead, wide, thick in table
+        ]
+        self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 10)
+        thumb = (
+            (0.030, 0.004, 0.026, 0.016, 0.014),
+            (0.058, 0.012, 0.046, 0.014, 0.013),
+            (0.084, 0.022, 0.054, 0.011, 0.011),
+            (0.096, 0.026, 0.055, 0.006, 0.006),
+        )
+        rings = [
+            (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
+            for down, palm, ahead, wide, thick in thumb
+        ]
+        self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 8)
+
+
+def _half_way(levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heights and positions in a chain such that a joint's height is half way between it and the one below it."""
+    middles = 0.5 * (levels[1:] + levels[:-1])
+    heights = np.concatenate([[levels[0] - 0.08], middles, [levels[-1] + 0.08]])
+    return heights, np.arange(len(heights), dtype=float)

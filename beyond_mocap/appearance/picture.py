@@ -1,0 +1,93 @@
+"""A small picture of one pose: the low-poly body on transparent ground, drawn with numpy alone.
+
+Faces are filled from far to near, at twice the size, and averaged down: no window, no graphics card, the same pixels
+everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.vectors import unit_vectors
+from .body import MATERIALS, deformed, low_poly_body
+from ..motion.humanoid import heading_from_positions
+from ..motion.motion import Motion, forward_kinematics, place
+
+COLOURS = {
+    "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),
+    "boots": (0.12, 0.12, 0.13), "hair": (0.16, 0.11, 0.09),
+}
+_SUN = np.array([0.35, -0.45, 0.82])
+_ROUND, _DOWN = np.radians(-50.0), np.radians(12.0)  # from the body's front to the camera; how far it looks down
+_MARGIN = 0.06  # of the picture's side
+_SHADOW = (0.0, 0.0, 0.0, 0.30)
+
+
+def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
+    """The body at one frame, seen from its right front, as large as fits: (size, size, 4) RGBA 0 to 1, the lowest row
+    first, alpha not multiplied in. InputError where the skeleton has no legs."""
+    one = motion.frames(frame, frame + 1)
+    one = place(one, -float(heading_from_positions(motion.skeleton, forward_kinematics(one)[0])[0]))
+    places, world = forward_kinematics(one)
+    body = low_poly_body(motion.skeleton, example=motion)
+    skin = deformed(body, motion.skeleton, places, world)[0]
+    across, up, away = _camera()
+    shade = skin - (skin[:, 2:] - skin[:, 2].min()) * (_SUN / _SUN[2])
+    both = np.concatenate([skin, shade])
+    flat = np.stack([both @ across, both @ up], axis=1)
+    span = float(np.ptp(flat, axis=0).max())
+    wide = 2 * size
+    flat = (flat - flat.min(axis=0) - 0.5 * np.ptp(flat, axis=0)) * (wide * (1.0 - 2.0 * _MARGIN) / span) + 0.5 * wide
+    quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
+    canvas = np.zeros((wide, wide, 4))
+    _draw_faces(canvas, skin, flat, quads, np.asarray(body.material), away)
+    return _averaged(canvas, size)
+
+
+def _camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The picture's right, its up, and the way from the body to the camera: three unit vectors (3,)."""
+    away = np.array([np.cos(_ROUND) * np.cos(_DOWN), np.sin(_ROUND) * np.cos(_DOWN), np.sin(_DOWN)])
+    across = np.array([-np.sin(_ROUND), np.cos(_ROUND), 0.0])
+    return across, np.cross(away, across), away
+
+
+def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
+    """The shadow of faces that look at the sun, then the faces that look at the camera, the far ones first.
+
+    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows.
+    """
+    corners = skin[quads]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    normal = unit_vectors(normal, least=1e-12)
+    light = normal @ (_SUN / np.linalg.norm(_SUN))
+    colour = (
+        np.array([COLOURS[part] for part in MATERIALS])[material] * (0.55 + 0.45 * np.maximum(light, -0.5))[:, None]
+    )
+    lit = quads[light > 0.0] + len(skin)
+    _fill(canvas, flat[lit], np.tile(_SHADOW, (len(lit), 1)))
+    seen = np.flatnonzero(normal @ away > 0.0)
+    seen = seen[np.argsort((corners[seen] @ away).mean(axis=1))]
+    _fill(canvas, flat[quads[seen]], np.pad(colour[seen], ((0, 0), (0, 1)), constant_values=1.0))
+
+
+def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
+    """Convex polygons (F, 4, 2) pixels, whichever way round, one after the other; colours (F, 4) take the place of what
+    was there."""
+    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
+    high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
+    onward = np.roll(corners, -1, axis=1) - corners
+    area = np.sum(corners[..., 0] * onward[..., 1] - corners[..., 1] * onward[..., 0], axis=1)
+    onward = onward * np.where(area < 0.0, -1.0, 1.0)[:, None, None]
+    ahead = onward[..., 0] * corners[..., 1] - onward[..., 1] * corners[..., 0]
+    pixel = np.arange(len(canvas)) + 0.5
+    for (x, y), (right, top), edges, offset, colour in zip(low.tolist(), high.tolist(), onward, ahead, colours):
+        side = edges[:, :1, None] * pixel[None, y:top, None] - edges[:, 1:, None] * pixel[None, None, x:right]
+        canvas[y:top, x:right][(side >= offset[:, None, None] - 1e-9).all(axis=0)] = colour
+
+
+def _averaged(canvas: np.ndarray, size: int) -> np.ndarray:
+    """Four pixels to one, colours weighted by their alpha."""
+    four = canvas.reshape(size, 2, size, 2, 4)
+    alpha = four[..., 3:].mean(axis=(1, 3))
+    colour = (four[..., :3] * four[..., 3:]).mean(axis=(1, 3)) / np.maximum(alpha, 1e-9)
+    return np.concatenate([colour, alpha], axis=-1)

@@ -1,0 +1,88 @@
+"""A flat drawing laid on a body's shirt, back or chest, so that it rides the cloth: shirt numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.vectors import cross_level
+from ..base.errors import InputError
+from .body import SHIRT, BodyMesh, deformed
+from ..motion.motion import Motion
+from ..motion.retargeting.neutral import neutral_stance
+from ..motion.skeleton import Skeleton, frozen_array
+
+_ABOVE = 0.004  # metres of the drawing over the cloth: more than rings of few sides dip in while they bend
+_MIDDLE = {"back": 0.70, "chest": 0.74}  # share of the shirt's height, from its hem, of the drawing's middle
+
+
+@dataclass(frozen=True, eq=False)
+class OnShirt:
+    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) metres, joints (N, 6) and weights (N, 6) that sum
+    to 1."""
+
+    vertices: np.ndarray
+    joints: np.ndarray
+    weights: np.ndarray
+
+
+def on_shirt(
+    body: BodyMesh, skeleton: Skeleton, points: np.ndarray, side: str = "back", example: Motion | None = None
+) -> OnShirt:
+    """Points (N, 2) of a drawing, metres to the right and up from its middle as one sees it who looks at that side,
+    "back" or "chest", of a person who stands.
+
+    body: of `low_poly_body` with the same `example`. Each point takes place and weights of the triangle of cloth behind
+    it, so it stays on the shirt in every pose. Points beside the shirt are put on its edge. InputError where the body
+    has no shirt.
+    """
+    neutral = neutral_stance(skeleton, example)
+    standing = deformed(body, skeleton, neutral.positions, neutral.rotations)
+    outward = 1.0 if side == "chest" else -1.0
+    triangles = _cloth(body, standing, outward)
+    if not len(triangles):
+        raise InputError("body", "no shirt", "a body with a shirt", "make it with low_poly_body")
+    low, high = np.min(standing[triangles][..., 2]), np.max(standing[triangles][..., 2])
+    across = outward * np.asarray(points)[:, 0] + np.mean(standing[triangles][..., 1])
+    up = np.asarray(points)[:, 1] + low + _MIDDLE[side] * (high - low)
+    chosen, share = _behind(standing[triangles][..., 1:], np.column_stack([across, up]))
+    corners = triangles[chosen]
+    at_rest = np.einsum("nk,nkc->nc", share, body.vertices[corners])
+    edges = body.vertices[corners[:, 1:]] - body.vertices[corners[:, :1]]
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    weights = (share[:, :, None] * body.weights[corners]).reshape(len(corners), -1)
+    joints = body.joints[corners].reshape(len(corners), -1)
+    return OnShirt(frozen_array(at_rest + _ABOVE * normal), frozen_array(joints, int), frozen_array(weights))
+
+
+def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
+    """Triangles (K, 3) of the trunk's shirt that look that way along X; `standing` (V, 3) m in the neutral stance."""
+    faces = [face for face, material in zip(body.faces, body.material) if material == SHIRT]
+    split = [(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)]
+    triangles = np.array(split, dtype=int).reshape(-1, 3)
+    edges = standing[triangles[:, 1:]] - standing[triangles[:, :1]]
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    size = np.linalg.norm(normal, axis=1)
+    trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[_widest(standing, triangles)], 0]))
+    return triangles[trunk & (outward * normal[:, 0] > 0.2 * size) & (size > 1e-9)]
+
+
+def _widest(standing: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(K,) bool: triangles near the middle plane: those are no sleeves."""
+    return np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1
+
+
+def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or comes nearest to it, and barycentric shares
+    (N, 3)."""
+    origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = cross_level(first, second)
+    away = points[:, None] - origin
+    b = cross_level(away, second) / area
+    c = cross_level(first, away) / area
+    shares = np.stack([1.0 - b - c, b, c], axis=-1)
+    chosen = np.argmax(shares.min(axis=-1), axis=1)
+    share = np.clip(shares[np.arange(len(points)), chosen], 0.0, None)
+    return chosen, share / share.sum(axis=1, keepdims=True)

@@ -1,0 +1,142 @@
+"""The verb `passes`: several players keep a ball going."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from .. import __version__
+from ..base.settings.options import add_options
+from ..base.errors import InputError
+from .outputs import Writer, named_folder
+from .progress_reporter import Told
+
+
+def add(verbs):
+    """The verb's parser."""
+    verb = verbs.add_parser("passes", help="several players keep a ball going")
+    verb.add_argument("scene", type=Path, metavar="SCENE.json", help="who passes to whom; docs/passes/passes.md has its form")
+    verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
+    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
+    add_options(verb, "library")
+    verb.set_defaults(run=run)
+    return verb
+
+
+def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`passes`: plays the scene and writes its players, its ball and what came of it."""
+    from ..passes.scene_json import read_scene
+    from ..library.build import build
+    from ..passes.passes import ball_of, passes
+
+    begun = time.perf_counter()
+    _check_folder(options.out)
+    scene = read_scene(options.scene)
+    with _naming(options.scene):
+        ball_of(scene)
+    library = build(
+        options.library, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
+        progress=lambda share, text: told.progress(0.3 * share, text), cancelled=told.cancelled,
+    )
+    loaded = time.perf_counter()
+    with _naming(options.scene):
+        played = passes(library, scene, lambda share, text: told.progress(0.3 + 0.65 * share, text), told.cancelled)
+    done = time.perf_counter()
+    told.check()
+    table = strikes(library, played)
+    report = {**_report(played, table), "seconds": {"load": loaded - begun, "play": done - loaded}}
+    _write(options.out, played, table, report)
+    told.end()
+    for line in played.warnings:
+        told.note(f"{options.scene}: {line}")
+    names = {player.name for player in played.players}
+    others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
+    if others:
+        told.note(f"{options.out}: of another scene, left there: {', '.join(others)}")
+    gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
+    print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
+          f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
+
+
+class _naming:
+    """What is wrong with a scene is told with its file."""
+
+    def __init__(self, path: Path):
+        self._path = path
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, kind, error, trace):
+        if isinstance(error, InputError) and not error.where.startswith(str(self._path)):
+            raise InputError(self._path, str(error)) from None
+
+
+def _check_folder(folder: Path) -> None:
+    """Before work begins: the folder is there or can be made."""
+    if folder.exists() and not folder.is_dir():
+        raise InputError(folder, "is a file", "a folder", "choose another name")
+    place = folder if folder.is_dir() else folder.absolute().parent
+    if not place.is_dir():
+        raise InputError(folder, "the folder above it does not exist", "an existing folder", "make that folder first")
+    if not os.access(place, os.W_OK | os.X_OK):
+        raise InputError(folder, "cannot be written to", "a folder of yours", "choose another folder")
+
+
+def strikes(library, played) -> list[dict]:
+    """The strikes of a scene as rows of strikes.csv."""
+    out = []
+    for number, one in enumerate(played.plan.strikes):
+        order, clip = one.order, library.clips[one.order.clip]
+        x, y, z = order.ball
+        out.append({
+            "time_s": order.time, "frame": int(round(order.time * played.plan.fps)), "player": one.player,
+            "kind": order.kind,
+            "part": order.part, "side": order.side, "clip": clip.path, "clip_frame": float(order.strike_frame),
+            "mirrored": clip.mirrored, "x_m": x, "y_m": y, "z_m": z,
+            "speed_in_m_s": float(np.linalg.norm(one.velocity_in)),
+            "speed_out_m_s": float(np.linalg.norm(one.velocity_out)),
+            "travel_s": one.travel, "bounces": one.bounces, "facing_deg": float(np.degrees(order.facing)),
+            "contact_gap_m": played.gap(number), "outcome": one.outcome,
+        })  # fmt: skip
+    return out
+
+
+def _report(played, table: list[dict]) -> dict:
+    """The figures of a scene, for JSON."""
+    plan, kind = played.plan, played.kind
+    return {
+        "version": __version__, "seed": played.scene.seed, "fps": plan.fps, "frames": len(played.ball.times),
+        "duration_s": plan.seconds, "ball": vars(kind), "strikes": table,
+        "bounces": [float(time) for flight in plan.flights for time in flight.bounces],
+        "players": [_of_player(player) for player in played.players], "warnings": list(played.warnings),
+    }
+
+
+def _of_player(player) -> dict:
+    """How well one player's motion came out."""
+    from ..evaluation.report import evaluate
+
+    whole = evaluate(player.take, None, None)
+    kept = ("skate", "seam_jerk_ratio", "foot_correction_m", "ik_miss_share", "ground_mm")
+    own = {"name": player.name, "strikes": len(player.gaps), "moved_m": player.moved}
+    return {**own, **{name: whole[name] for name in kept}}
+
+
+def _write(folder: Path, played, table: list[dict], report: dict) -> None:
+    from ..files.bvh import bvh
+    from ..passes.strikes_csv import write_strikes
+    from ..files.tables import write_ball, write_report
+    from ..synthesis.provenance import write_provenance
+
+    folder.mkdir(exist_ok=True)
+    for player in played.players:
+        bvh.write(folder / f"{player.name}.bvh", player.take.motion)
+        write_provenance(folder / f"{player.name}.provenance.csv", player.take)
+    write_ball(folder / "ball.csv", played.ball)
+    write_strikes(folder / "strikes.csv", table)
+    write_report(folder / "scene.report.json", report)

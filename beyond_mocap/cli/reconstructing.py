@@ -1,0 +1,254 @@
+"""The verb `reconstruct`: optical markers become a moving skeleton, of one trial or of a folder of them."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from ..base.settings.options import add_options, option_values
+from ..base.errors import InputError
+from .outputs import Writer, check_outputs, writer_of
+from .progress_reporter import Told
+
+_MOST_LINES = 12
+
+
+def add(verbs):
+    """The verb's parser."""
+    verb = verbs.add_parser("reconstruct", help="optical markers (.c3d, .trc) become a moving skeleton")
+    verb.add_argument("trial", type=Path, metavar="TRIAL", help="a recording of markers, or a folder of them")
+    verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same standing body")
+    verb.add_argument("--model", type=Path, metavar="MODEL.json", help="a model made before; then no --static")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh", help="for a folder of trials: a folder")
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
+    add_options(verb, "markers")
+    verb.set_defaults(run=run)
+    return verb
+
+
+def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`reconstruct`: of one trial, or of all in a folder."""
+    from ..library.add_clip import plain_words
+
+    if options.model and options.static:
+        raise InputError("--model", "with --static", "one of them", "leave one out")
+    if options.words and not options.add_to:
+        raise InputError("--words", "without --add-to", "both", "add --add-to LIBRARY")
+    options.words = plain_words(options.words)
+    if options.trial.is_dir():
+        _run_folder(options, told)
+    else:
+        _run_one(options, told, writers)
+
+
+def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    from ..markers.files.model_json import write_model
+    from ..files.tables import write_report
+    from ..markers.reconstruct import reconstruct
+
+    begun = time.perf_counter()
+    inputs = (options.trial, options.static, options.model)
+    check_outputs(options.out, options.report, options.save_model, never=inputs)
+    write = writer_of(options.out, writers)
+    if options.add_to:
+        from ..library.add_clip import free_place
+
+        check_outputs(options.out, free_place(options.add_to, options.trial.stem))
+    settings = settings_of(options)
+    trial = read_trial(options.trial, options)
+    static = None if options.static is None else read_trial(options.static, options)
+    model = None if options.model is None else _model(options.model)
+    loaded = time.perf_counter()
+    try:
+        made = reconstruct(trial, static, model, settings, told.progress, told.cancelled)
+    except InputError as error:
+        raise _with_file(error, options) from None
+    made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
+    if _is_throw(options.words) and made.release is None:
+        raise InputError(options.trial, "no release was found for a throw's words", "a throw", "leave --words out")
+    notes = add_to_library(made, options.trial.stem, options) if options.add_to else []
+    if options.report:
+        write_report(options.report, made.report())
+    write(as_take(made), options.out)
+    if options.save_model:
+        write_model(made.model, options.save_model)
+    told.end()
+    lines = [f"{options.trial}: {line}" for line in (*trial.notes, *made.warnings)]
+    _tell(told, [*_upright_alike(options, trial, static), *lines], options.report)
+    for note in notes:
+        told.note(note)
+    print(f"{options.out}: {summary(made)}")
+
+
+def _upright_alike(options, trial, static) -> list[str]:
+    """A line where two files of one kind are read with different axes up."""
+    if static is None or options.up or options.trial.suffix.lower() != options.static.suffix.lower():
+        return []
+    mine, other = ({line.split(",")[0] for line in one.notes if " is up" in line} for one in (trial, static))
+    if mine == other:
+        return []
+    return [f"{options.trial} and {options.static} disagree: {', '.join(sorted(mine | other))}; --up says which"]
+
+
+def _tell(told: Told, lines: list[str], report: Path | None) -> None:
+    """The first of many lines; all of them are in the report."""
+    for line in lines[:_MOST_LINES]:
+        told.note(line)
+    if len(lines) > _MOST_LINES:
+        more = len(lines) - _MOST_LINES
+        told.note(f"{more} more lines: {f'see {report}' if report else '--report R.json writes them'}")
+
+
+def _run_folder(options, told: Told) -> None:
+    """All trials of a folder: NAME.bvh, NAME.report.json and, where a static has made one, NAME.model.json each, and
+    trials.json and report.html over all."""
+    from ..markers.reconstruct_folder import reconstruct_folder, recordings_of
+
+    for name in ("static", "report", "save_model"):
+        if getattr(options, name):
+            raise InputError(f"--{name.replace('_', '-')}", "with a folder of trials", "one trial",
+                             "leave it out: statics are found, and each trial gets its own report")  # fmt: skip
+    if options.add_to and not options.add_to.is_dir():
+        raise InputError(options.add_to, "is not a folder", "a library's folder", "make the folder first")
+    recordings_of(options.trial)  # there are some
+    settings = settings_of(options)
+    model = None if options.model is None else _model(options.model)
+    _check_folder(options.out, options.trial)
+    read = partial(read_trial, options=options)
+    rows = []
+    for made in reconstruct_folder(options.trial, read, settings, model, told.progress, told.cancelled):
+        rows.append(_kept(made, options))
+        told.end()
+        print(rows[-1]["line"])
+    _write_overview(rows, options, told)
+    if not any(row["bvh"] for row in rows):
+        raise InputError(options.trial, "none of its trials could be made", "at least one", rows[0]["line"])
+
+
+def _check_folder(out: Path, trials: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise InputError(out, "is a file", "a folder, as the trials are one", "choose another name")
+    if out.resolve() == trials.resolve():
+        raise InputError(out, "is the folder of the trials", "another one", "choose another folder")
+    if not out.exists():
+        check_outputs(out)
+        out.mkdir()
+
+
+def _kept(made, options) -> dict:
+    """Writes what became of one trial; its row of trials.json."""
+    from ..files.bvh import bvh
+    from ..markers.files.model_json import write_model
+    from ..files.tables import write_report
+
+    name = made.recording.name
+    row = {"trial": name, "file": str(made.recording.path), "session": made.recording.session, "error": made.error,
+           "static": made.static and made.static.name, "bvh": "", "report": ""}  # fmt: skip
+    if made.made is None:
+        return {**row, "line": f"{name}: {made.error.removeprefix(f'{made.recording.path.stem}: ')}"}
+    place = options.out / name
+    place.parent.mkdir(parents=True, exist_ok=True)
+    bvh.write(place.parent / f"{place.name}.bvh", made.made.motion)
+    write_report(place.parent / f"{place.name}.report.json", made.made.report())
+    write_model(made.made.model, place.parent / f"{place.name}.model.json")
+    try:
+        notes = add_to_library(made.made, name.replace("/", "_"), options) if options.add_to else []
+    except InputError as error:  # of this clip alone
+        notes = [f"not added: {error}"]
+    return {**row, "bvh": f"{name}.bvh", "report": f"{name}.report.json", "subject": made.made.model.subject,
+            "line": "; ".join([f"{name}: {summary(made.made)}", *filter(None, [made.note]), *notes])}  # fmt: skip
+
+
+def _write_overview(rows, options, told: Told) -> None:
+    """trials.json, and report.html where matplotlib is there to draw it."""
+    from ..evaluation.plots import require_matplotlib
+    from ..markers.report.page import trials_report
+    from ..files.tables import write_report
+    from ..files.whole import atomic_write
+
+    write_report(options.out / "trials.json", {"trials": rows})
+    try:
+        require_matplotlib()
+    except InputError as error:
+        told.note(f"{options.out / 'report.html'} was not written: {error}")
+        return
+    atomic_write(options.out / "report.html", trials_report(options.out))
+
+
+def settings_of(options):
+    """The recipe's settings."""
+    from ..markers.files.marker_set_text import chosen_set
+    from ..markers.reconstruct import ReconstructSettings
+
+    found = option_values(ReconstructSettings, options, "markers")
+    if _is_throw(options.words) and options.release == "auto":
+        found["release"] = "yes"
+    return ReconstructSettings(marker_set=options.marker_set and chosen_set(options.marker_set), **found)
+
+
+def read_trial(path: Path, options):
+    """A recording, at the rate that was asked for."""
+    from ..markers.files.marker_files import read_markers
+
+    trial = read_markers(path, unit=options.unit, subject=options.subject, up=options.up)
+    return replace(trial, fps=options.fps) if options.fps else trial
+
+
+def _model(path: Path):
+    from ..markers.files.model_json import read_model
+
+    return read_model(path)
+
+
+def _with_file(error: InputError, options) -> InputError:
+    """The same error, told with its file: trials know only the file's name."""
+    for path in (options.trial, options.static):
+        if path is not None and error.where == path.stem:
+            return InputError(path, str(error).split(": ", 1)[1])
+    return error if error.where.startswith("--") else InputError(options.trial, str(error))
+
+
+def as_take(made):
+    """The reconstruction as a take, for those who write takes: Blender's formats too."""
+    from ..annotation import Timeline
+    from ..motion.contacts import points
+    from ..synthesis.take import Take
+
+    count = len(made.motion)
+    try:
+        contacts = points(made.motion).all(axis=2)
+    except InputError:  # no legs
+        contacts = np.zeros((count, 2), bool)
+    return Take(
+        motion=made.motion, start_time=made.trial.start, clips=(made.raw.name,), clip=np.zeros(count, int),
+        clip_frame=np.arange(count, dtype=float), mirrored=np.zeros(count, bool), words=((),) * count,
+        contacts=contacts, seams=np.zeros(0, int), timeline=Timeline(), keys=(),
+        ball=None if made.release is None else made.release.path, method="reconstruct", seed=0, warnings=made.warnings,
+    )  # fmt: skip
+
+
+def summary(made) -> str:
+    """What came out, in a line."""
+    residual = made.solved.residual[np.isfinite(made.solved.residual)]
+    near = f", markers {1000.0 * np.mean(residual):.1f} mm off" if len(residual) else ""
+    return f"{len(made.motion)} frames, {made.motion.duration:.1f} s, {len(made.model.markers)} markers{near}"
+
+
+def _is_throw(words) -> bool:
+    return any(word.startswith("throw") for word in words)
+
+
+def add_to_library(made, name: str, options) -> list[str]:
+    """The motion as a clip of a library, a throw's words at its release; notes for people."""
+    from ..library.add_clip import add_clip
+
+    key = None
+    if _is_throw(options.words) and made.release is not None:
+        key = made.release.frame / made.motion.fps
+    return add_clip(options.add_to, name, made.on_floor(), options.words, key)

@@ -1,0 +1,172 @@
+"""The verb `study`: how natural motions look to people; orders, forms and the analysis of what comes back."""
+
+from __future__ import annotations
+
+import argparse
+import mimetypes
+import os
+import shutil
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from ..base.settings.options import add_options
+from ..base.errors import InputError
+from .outputs import Writer, check_outputs
+from .progress_reporter import Told
+
+CLIPS, FORMS, ANSWERS = "clips", "forms", "answers"
+"""Folders of a study."""
+_MOVIE = ".mp4"
+_EMBED_MOST = 200_000_000  # bytes of all clips in one form
+
+
+def add(verbs):
+    """The verb's parser, with those of its own verbs."""
+    verb = verbs.add_parser("study", help="how natural motions look to people: order, form, analyse")
+    own = verb.add_subparsers(dest="study_verb", required=True, metavar="VERB", parser_class=type(verb))
+    for add_one in (_add_order, _add_form, _add_analyse):
+        add_one(own).add_argument(
+            "--json", action="store_true", default=argparse.SUPPRESS, help="progress as JSON lines on stderr",
+        )
+    return verb
+
+
+def _add_order(verbs):
+    verb = verbs.add_parser("order", help="neutral names for clips, and an order for each rater")
+    verb.add_argument("clips", type=Path, metavar="CLIPS.csv", help="file,system,scenario; two are 'training'")
+    add_options(verb, "study.order")
+    verb.set_defaults(run=run_order)
+    return verb
+
+
+def _add_form(verbs):
+    verb = verbs.add_parser("form", help="a page, and a table, for each rater")
+    verb.add_argument("study", type=Path, metavar="FOLDER", help="what study order wrote")
+    add_options(verb, "study.form")
+    verb.set_defaults(run=run_form)
+    return verb
+
+
+def _add_analyse(verbs):
+    verb = verbs.add_parser("analyse", help="one-sided tests, effect sizes and pictures of the answers")
+    verb.add_argument("study", type=Path, metavar="FOLDER")
+    verb.add_argument("--answers", type=Path, nargs="+", metavar="FILE", help="files or folders; else FOLDER/answers")
+    add_options(verb, "study.analyse")
+    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    verb.add_argument("--html", type=Path, metavar="R.html", help="a page with pictures; needs matplotlib")
+    verb.set_defaults(run=run_analyse)
+    return verb
+
+
+def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`study order`: writes study.json and, if asked, the movies under neutral names; motions are to be rendered."""
+    from ..files.whole import whole_folder
+    from ..study.form import MOVIES
+    from ..study.order import ordered
+    from ..study.study_file import read_clips, write_study
+
+    table = options.clips.parent
+    clips = [replace(clip, file=_from(options.out, table / clip.file)) for clip in read_clips(options.clips)]
+    try:
+        study = ordered(clips, options.raters, options.seed, options.pairs)
+    except InputError as error:
+        if error.where != "clips":
+            raise
+        raise InputError(options.clips, str(error).removeprefix("clips: ")) from None
+    movies = [clip for clip in study.clips if options.copy and Path(clip.file).suffix.lower() in MOVIES]
+    with whole_folder(options.out) as place:
+        write_study(place, study)
+        if movies:
+            (place / CLIPS).mkdir()
+        for number, clip in enumerate(movies, 1):
+            told.check()
+            _copy(options.out / clip.file, place / CLIPS / clip.name)
+            told.progress(number / len(movies), clip.name)
+    told.end()
+    if options.copy and len(movies) < len(study.clips):
+        told.note(f"{len(study.clips) - len(movies)} of {len(study.clips)} clips are no movies and are to be rendered")
+    shown = len(next(iter(study.orders.values())))
+    print(f"{options.out}: study {study.id}, {len(study.clips)} clips of {len(study.systems)} systems, "
+          f"{len(study.orders)} raters with {shown} pages each")  # fmt: skip
+
+
+def _from(folder: Path, path: Path) -> str:
+    """A path as it is called from a folder that need not be there yet, so that both can be moved together."""
+    try:
+        return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    except ValueError:  # on another drive
+        return path.resolve().as_posix()
+
+
+def _copy(source: Path, target: Path) -> None:
+    """One movie, under its neutral name; neither time nor name of the file are kept."""
+    source = source.resolve()
+    if not source.is_file():
+        raise InputError(source, "no such file", "a movie", "correct the table, or leave --copy out")
+    shutil.copyfile(source, target.with_suffix(source.suffix.lower()))
+
+
+def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`study form`: a page and a table for each rater in FOLDER/forms."""
+    from ..files.whole import atomic_write
+    from ..study.form import clip_source, form_page, form_table
+    from ..study.study_file import read_study
+
+    study = read_study(options.study)
+    found = {clip.name: clip_source(options.study / CLIPS, clip.name) for clip in study.clips}
+    absent = [name for name, path in found.items() if path is None]
+    if options.embed and absent:
+        raise InputError(options.study / CLIPS, f"{len(absent)} clips are missing, such as {absent[0]}{_MOVIE}",
+                         "a movie for each clip", "render them first")  # fmt: skip
+    sources = _embedded(options.study, found) if options.embed else {
+        name: f"../{CLIPS}/{path.name if path else name + _MOVIE}" for name, path in found.items()
+    }
+    (options.study / FORMS).mkdir(exist_ok=True)
+    for number, rater in enumerate(study.orders, 1):
+        told.check()
+        atomic_write(options.study / FORMS / f"{rater}.html", form_page(study, rater, sources))
+        atomic_write(options.study / FORMS / f"{rater}.csv", form_table(study, rater))
+        told.progress(number / len(study.orders), rater)
+    told.end()
+    if absent:
+        missing = f"{len(absent)} of {len(found)} clips are not there yet, such as {absent[0]}{_MOVIE}"
+        told.note(f"{options.study / CLIPS}: {missing}")
+    print(f"{options.study / FORMS}: {len(study.orders)} forms")
+
+
+def _embedded(folder: Path, found: Mapping[str, Path]) -> dict[str, str]:
+    """Data addresses of all clips."""
+    from ..evaluation.html_page import build_data_address
+
+    size = sum(path.stat().st_size for path in found.values())
+    if size > _EMBED_MOST:
+        what = f"{size / 1e6:.0f} MB of movies"
+        raise InputError(folder / CLIPS, what, f"{_EMBED_MOST / 1e6:.0f} MB at most in a page", "leave --embed out")
+    kinds = {name: mimetypes.guess_type(path.name)[0] or "video/mp4" for name, path in found.items()}
+    return {name: build_data_address(path.read_bytes(), kinds[name]) for name, path in found.items()}
+
+
+def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`study analyse`: the report, and its page."""
+    from ..files.tables import write_report
+    from ..files.whole import atomic_write
+    from ..study.analysis import analysed
+    from ..study.answers import answer_files, read_answers
+    from ..study.page import p_text, study_page, study_report
+    from ..study.study_file import read_study
+
+    answers = options.answers or [options.study / ANSWERS]
+    check_outputs(options.report, options.html, never=(*answer_files(answers), options.study / "study.json"))
+    study = read_study(options.study)
+    found = analysed(study, read_answers(study, answers), [tuple(pair) for pair in options.better])
+    page = study_page(found) if options.html else None
+    write_report(options.report, study_report(found))
+    if page:
+        atomic_write(options.html, page)
+    told.end()
+    for note in found.notes:
+        told.note(note)
+    for one in found.findings:
+        said = "more natural" if one.better else "not shown to be more natural"
+        print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")

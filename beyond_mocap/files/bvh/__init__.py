@@ -1,0 +1,1 @@
+"""BVH files in and out."""

@@ -1,0 +1,297 @@
+"""The text of a BVH file, as it stands: hierarchy and numbers in the file's own units and axes, nothing converted.
+
+BVH has no standard; this is the form that Meredith and Maddock (2001, "Motion Capture File Formats Explained")
+describe, read leniently where files differ (letter case, blanks, line ends, joint names with blanks), strictly where a
+body would come out wrong.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError
+from ..content import content
+
+POSITIONS = ("Xposition", "Yposition", "Zposition")
+ROTATIONS = ("Xrotation", "Yrotation", "Zrotation")
+_CHANNELS = {name.lower(): name for name in POSITIONS + ROTATIONS}
+_LARGEST_ANGLE = 1e7  # degrees: damaged, whatever it was
+_EXPORT_AGAIN = "export the file again"
+_DAMAGED = f"the file is cut off or damaged; {_EXPORT_AGAIN}"
+
+
+@dataclass(frozen=True)
+class BvhText:
+    """A file's content. J joints, parents before children; file units, file axes, degrees.
+
+    names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
+    end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file
+    order. first_row: line of the first frame. renamed: names that stood twice, with what they became.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: np.ndarray
+    channels: tuple[tuple[str, ...], ...]
+    end_parents: tuple[int, ...]
+    end_offsets: np.ndarray
+    frame_time: float
+    values: np.ndarray
+    first_row: int
+    renamed: tuple[tuple[str, str], ...]
+
+
+def parse(path) -> BvhText:
+    """Read the file at `path`; InputError (file:line) where it is missing, truncated, damaged or no BVH file."""
+    path = Path(path)
+    return parse_data(path, _content(path))
+
+
+def parse_data(path: Path, data: bytes) -> BvhText:
+    """The same of bytes with plain line ends that came from elsewhere; `path` is what errors call them."""
+    motion = re.search(rb"^[ \t]*MOTION\b[^\n]*\n?", data, re.M | re.I)
+    if motion is None:
+        raise InputError(path, "no MOTION section", "HIERARCHY, then MOTION", f"the file is cut off; {_EXPORT_AGAIN}")
+    joints = _Hierarchy(path).read(_decoded(data[: motion.start()]))
+    line = data.count(b"\n", 0, motion.end()) + 1
+    frames, frame_time, body, line = _motion_head(path, data, motion.end(), line)
+    columns = sum(len(c) for c in joints.channels)
+    if columns == 0:
+        raise InputError(path, "no joint has channels", "a CHANNELS line per joint", _EXPORT_AGAIN)
+    values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
+    if len(values) != frames:
+        raise InputError(
+            f"{path}:{line}",
+            f"{len(values)} rows of motion",
+            f"{frames} as Frames says",
+            f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
+        )
+    _check_angles(path, joints, values, line)
+    return joints.finish(frame_time, values, line)
+
+
+def _content(path: Path) -> bytes:
+    """The file's bytes, line ends unified; InputError where it cannot be read or is no text."""
+    data = content(path, "a BVH file")
+    if not data or data.isspace():
+        raise InputError(path, "empty file", "a BVH file", _EXPORT_AGAIN)
+    if data.startswith(b"\xef\xbb\xbf"):
+        data = data[3:]
+    if b"\0" in data or not re.match(rb"\s*HIERARCHY\b", data, re.I):
+        raise InputError(f"{path}:1", f"starts with {data[:12]!r}", "HIERARCHY, as BVH files do", "choose a BVH file")
+    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+
+
+def _decoded(data: bytes) -> str:
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError:
+        return data.decode("latin-1")
+
+
+class _Hierarchy:
+    """Reads the hierarchy token by token, with a stack instead of recursion: files may nest thousands deep."""
+
+    def __init__(self, path: Path):
+        self.path = path
+        self.names: list[str] = []
+        self.parents: list[int] = []
+        self.offsets: list = []
+        self.channels: list[tuple[str, ...]] = []
+        self.ends: list = []
+        self.renamed: list[tuple[str, str]] = []
+        self.line = 1
+        self.stack: list[int | None] = []  # open joints; None for an End Site
+
+    def read(self, text: str) -> "_Hierarchy":
+        """All joints of the HIERARCHY section."""
+        lines = text.split("\n")
+        for self.line, line in enumerate(lines, 1):
+            words = line.replace("{", " { ").replace("}", " } ").split()
+            while words:
+                words = self._take(words)
+        if self.stack:
+            raise self._error(f"{len(self.stack)} brackets not closed", "a } for each {", "the hierarchy is cut off")
+        if not self.names:
+            raise self._error("no ROOT", "ROOT and a joint's name", _EXPORT_AGAIN)
+        for joint, offset in enumerate(self.offsets):
+            if offset is None:
+                raise InputError(self.path, f"joint {self.names[joint]!r} has no OFFSET", "OFFSET x y z", _EXPORT_AGAIN)
+        return self
+
+    def finish(self, frame_time: float, values: np.ndarray, first_row: int) -> BvhText:
+        """The joints together with the motion's numbers."""
+        ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
+        return BvhText(
+            self.path,
+            tuple(self.names),
+            tuple(self.parents),
+            np.array(self.offsets),
+            tuple(self.channels),
+            tuple(joint for joint, _ in ends),
+            np.array([offset for _, offset in ends]).reshape(-1, 3),
+            frame_time,
+            values,
+            first_row,
+            tuple(self.renamed),
+        )
+
+    def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
+        return InputError(f"{self.path}:{self.line}", found, expected, next_step)
+
+    def _take(self, words: list[str]) -> list[str]:
+        """Use the words of one statement, return the rest of the line."""
+        keyword = words[0].upper()
+        if keyword in ("HIERARCHY", "{"):
+            return words[1:]
+        if keyword in ("ROOT", "JOINT", "END"):
+            return self._open(keyword, words)
+        if keyword == "}":
+            if not self.stack:
+                raise self._error("a } too many", "a { for each }")
+            self.stack.pop()
+            return words[1:]
+        if keyword == "OFFSET":
+            return self._offset(words)
+        if keyword == "CHANNELS":
+            return self._take_channels(words)
+        raise self._error(f"{words[0]!r}", "ROOT, JOINT, End Site, OFFSET, CHANNELS or a bracket")
+
+    def _open(self, keyword: str, words: list[str]) -> list[str]:
+        stop = words.index("{") if "{" in words else len(words)
+        name = " ".join(words[1:stop])
+        if (keyword == "ROOT") == bool(self.names) or (self.stack == [] and self.names):
+            raise self._error(f"{keyword} {name}", "one ROOT with all joints inside it", "export one body per file")
+        if self.stack and self.stack[-1] is None:
+            raise self._error(f"{keyword} {name} inside an End Site", "}")
+        parent = self.stack[-1] if self.stack else -1
+        if keyword == "END":
+            self.ends.append([parent, None])
+            self.stack.append(None)
+            return words[stop:]
+        if not name:
+            raise self._error(f"{keyword} without a name", f"{keyword} and a name")
+        self.stack.append(len(self.names))
+        self.names.append(self._unique(name))
+        self.parents.append(parent)
+        self.offsets.append(None)
+        self.channels.append(())
+        return words[stop:]
+
+    def _unique(self, name: str) -> str:
+        taken, number, unique = set(self.names), 2, name
+        while unique in taken:
+            unique, number = f"{name}_{number}", number + 1
+        if unique != name:
+            self.renamed.append((name, unique))
+        return unique
+
+    def _offset(self, words: list[str]) -> list[str]:
+        numbers = [_number(word) for word in words[1:4]]
+        if len(numbers) < 3 or None in numbers:
+            raise self._error(f"{' '.join(words)[:60]!r}", "OFFSET and three numbers")
+        if not self.stack:
+            raise self._error("OFFSET outside of a joint", "ROOT first")
+        if self.stack[-1] is None:
+            self.ends[-1][1] = numbers
+        else:
+            self.offsets[self.stack[-1]] = numbers
+        return words[4:]
+
+    def _take_channels(self, words: list[str]) -> list[str]:
+        count = int(words[1]) if len(words) > 1 and re.fullmatch("[0-6]", words[1]) else None
+        names = [_CHANNELS.get(word.lower()) for word in words[2 : 2 + (count or 0)]]
+        if count is None or len(names) < count or None in names:
+            raise self._error(f"{' '.join(words)[:90]!r}", "CHANNELS, how many (0 to 6), and Xposition ... Zrotation")
+        if len(set(names)) < count:
+            raise self._error("one channel twice", "each channel once per joint")
+        if not self.stack or self.stack[-1] is None:
+            raise self._error("CHANNELS outside of a joint", "a joint first")
+        if self.channels[self.stack[-1]]:
+            raise self._error("CHANNELS a second time", "one CHANNELS line per joint")
+        self.channels[self.stack[-1]] = tuple(names)
+        return words[2 + count :]
+
+
+def _number(word: str) -> float | None:
+    """The word as a finite number, else None."""
+    try:
+        value = float(word) if "_" not in word else math.nan
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
+    """Frames, seconds per frame, where the rows start (byte, line) from the two lines after MOTION."""
+    frames_text, start, line = _labelled(path, data, start, line, rb"Frames\s*:", "Frames: and how many")
+    frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
+    if frames < 1:
+        raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
+    expected = "Frame Time: and seconds per frame"
+    time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
+    frame_time = _number(time_text)
+    if frame_time is None or not 1e-5 <= frame_time <= 1e3:
+        raise InputError(
+            f"{path}:{line - 1}", f"Frame Time: {time_text[:40]}", "seconds, above 0 (0.00001 to 1000)",
+            "correct that line",
+        )
+    return frames, frame_time, start, line
+
+
+def _labelled(path: Path, data: bytes, start: int, line: int, label: bytes, expected: str) -> tuple[str, int, int]:
+    """The value behind `label` on the next line that is not blank, and where the line after it starts."""
+    while True:
+        stop = data.find(b"\n", start)
+        stop = len(data) if stop < 0 else stop
+        text = data[start:stop].strip()
+        if text or stop == len(data):
+            break
+        start, line = stop + 1, line + 1
+    match = re.match(label, text, re.I)
+    if match is None:
+        raise InputError(f"{path}:{line}", f"{_decoded(text[:40])!r}", expected, _DAMAGED)
+    return _decoded(text[match.end() :].strip()), stop + 1, line + 1
+
+
+def _rows(path: Path, text: bytes, columns: int, line: int) -> np.ndarray:
+    """The motion's numbers (T, columns); InputError with the first bad line."""
+    if not text or text.isspace():
+        raise InputError(f"{path}:{line}", "no rows of motion", f"rows of {columns} numbers", _DAMAGED)
+    try:
+        values = np.loadtxt(io.BytesIO(text), comments=None, ndmin=2) + 0.0  # a zero has no minus
+        if values.shape[1] == columns and -1e300 < values.min() and values.max() < 1e300:
+            return values
+    except ValueError:
+        pass
+    raise _row_error(path, text, columns, line)
+
+
+def _check_angles(path: Path, joints: _Hierarchy, values: np.ndarray, line: int) -> None:
+    if max(values.max(), -values.min()) <= _LARGEST_ANGLE:
+        return
+    names = [f"{name} {c}" for name, channels in zip(joints.names, joints.channels) for c in channels]
+    for row, column in np.argwhere(np.abs(values) > _LARGEST_ANGLE):
+        if names[column].endswith("rotation"):
+            found = f"{values[row, column]:.3g} degrees in {names[column]}, frame {row}"
+            raise InputError(f"{path}:{line + row}", found, "an angle", _EXPORT_AGAIN)
+
+
+def _row_error(path: Path, text: bytes, columns: int, line: int) -> InputError:
+    """The first bad row; `text` begins with the end of the line before `line`."""
+    for at, row in enumerate(_decoded(text).split("\n"), line - 1):
+        words = row.split()
+        bad = next((word for word in words if _number(word) is None or abs(float(word)) >= 1e300), None)
+        if bad is not None:
+            return InputError(f"{path}:{at}", f"{bad[:30]!r}", "a number of ordinary size", _EXPORT_AGAIN)
+        if words and len(words) != columns:
+            expected = f"{columns}, one per channel of the hierarchy"
+            return InputError(f"{path}:{at}", f"{len(words)} numbers", expected, _DAMAGED)
+    return InputError(f"{path}:{line}", "numbers that cannot be read", f"rows of {columns} numbers", _EXPORT_AGAIN)

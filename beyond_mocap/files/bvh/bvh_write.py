@@ -1,0 +1,178 @@
+"""A motion as the text of a BVH file: hierarchy in file order, Euler angles, centimetres, Y up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Iterator
+
+import numpy as np
+
+from ...motion import quaternion
+from ...motion.humanoid import heading
+from ...motion.motion import Motion
+from ...motion.skeleton import Skeleton
+from .bvh_form import BvhForm, RootAbove
+from .bvh_text import POSITIONS, ROTATIONS
+
+_CENTIMETRES = 100.0
+_ZXY = ("Zrotation", "Xrotation", "Yrotation")
+_SAME_PLACE = 1e-4  # centimetres
+_SAME_ANGLE = np.degrees(1e-6)
+
+
+@dataclass(frozen=True)
+class _Joint:
+    """A joint as it is to stand in the file, centimetres and degrees, Y up.
+
+    depth: how many stand above it. offset: (3,). channels: names in order. columns: (T, channels). ends: (E, 3) tips.
+    added: channels that its form lacked.
+    """
+
+    name: str
+    depth: int
+    offset: np.ndarray
+    channels: tuple[str, ...]
+    columns: np.ndarray
+    ends: np.ndarray
+    added: tuple[str, ...]
+
+
+def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, ...]]:
+    """The file's text in pieces, and a note per joint that needed more channels than `form` gives it."""
+    joints = _above(motion, form.above)
+    root, rotation = _hips_below(motion, form.above)
+    for i, depth in _depth_first(motion.skeleton):
+        name = motion.skeleton.names[i]
+        declared = form.channels.get(name, (POSITIONS if i == 0 else ()) + _ZXY)
+        place = root if i == 0 else motion.skeleton.offsets[i][None]
+        ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
+        turn = rotation if i == 0 else motion.rotations[:, i]
+        joints.append(_joint(name, len(form.above) + depth, declared, place, turn, ends))
+    notes = tuple(f"{j.name}: {', '.join(j.added)} added, the motion needs it" for j in joints if j.added)
+    return _text(joints, motion.fps), notes
+
+
+def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
+    """Angles (T, 3) in degrees of rotations (T, 4) in the order of `letters`, completed to a permutation of XYZ.
+
+    Three letters: the middle angle within +-90 degrees. Fewer: of the two triples that make a rotation, (a, b, c) and
+    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero, so that these can be left
+    out.
+    """
+    order = letters + "".join(axis for axis in "ZXY" if axis not in letters)
+    angles = np.degrees(quaternion.to_euler(rotations, order))
+    if len(letters) == 3:
+        return angles
+    other = angles * (1.0, -1.0, 1.0) + 180.0
+    other = (other + 180.0) % 360.0 - 180.0
+    spare, other_spare = (np.abs(a[:, len(letters) :]).sum(axis=1) for a in (angles, other))
+    return np.where((other_spare < spare - _SAME_ANGLE)[:, None], other, angles)
+
+
+def _to_file(vectors: np.ndarray) -> np.ndarray:
+    """Our vectors (..., 3), metres, Z up, as the file has them: centimetres, Y up."""
+    return vectors[..., (0, 2, 1)] * (_CENTIMETRES, _CENTIMETRES, -_CENTIMETRES)
+
+
+def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, turn: np.ndarray, ends) -> _Joint:
+    """One joint: place (T or 1, 3) metres and turn (T, 4), relative to its parent, in our axes."""
+    places = _to_file(place)
+    lacking = [c for c, spread in zip(POSITIONS, np.ptp(places, axis=0)) if c not in declared and spread > _SAME_PLACE]
+    letters = "".join(c[0] for c in declared if c in ROTATIONS)
+    # our axes -> the file's: the same quarter turn as for vectors, on the quaternion's vector part
+    angles = euler_degrees(turn[:, (0, 1, 3, 2)] * (1.0, 1.0, 1.0, -1.0), letters)
+    if np.abs(angles[:, len(letters) :]).max(initial=0.0) > _SAME_ANGLE:
+        lacking += [axis + "rotation" for axis in "ZXY" if axis not in letters]
+    channels = declared + tuple(lacking)
+    order = [c[0] for c in channels if c in ROTATIONS]
+    frames = len(turn)
+    columns = [
+        np.broadcast_to(places[:, "XYZ".index(c[0])], frames) if c in POSITIONS else angles[:, order.index(c[0])]
+        for c in channels
+    ]
+    offset = places[0] if len(places) == 1 else np.where([c in channels for c in POSITIONS], 0.0, places[0])
+    columns = np.stack(columns, axis=1) if columns else np.zeros((frames, 0))
+    return _Joint(name, depth, offset, channels, columns, _to_file(ends), tuple(lacking))
+
+
+def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
+    """Joints in the order BVH nests them, with their depth; a skeleton that was read keeps its order."""
+    children: list[list[int]] = [[] for _ in skeleton.names]
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            children[parent].append(joint)
+    waiting = [(0, 0)]
+    while waiting:
+        joint, depth = waiting.pop()
+        yield joint, depth
+        waiting += [(child, depth + 1) for child in reversed(children[joint])]
+
+
+def _chain(motion: Motion, above: tuple[RootAbove, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Positions (T, 3) and rotations (T, 4) in the world of the joints above the hips, and of what they stand in first.
+
+    The topmost one that moved is put below the hips, turned to the body's facing; the others keep their places on it.
+    """
+    frames = len(motion)
+    worlds = [(np.zeros((frames, 3)), quaternion.identity(frames))]
+    moving = next((joint for joint in above if joint.moves), None)
+    for joint in above:
+        place, turn = worlds[-1]
+        if joint is moving:
+            facing = quaternion.about_up(heading(motion) + joint.heading)
+            ground = motion.root_positions * (1.0, 1.0, 0.0)
+            if joint.carries is not None:
+                ground = motion.root_positions - quaternion.rotate(facing, joint.carries)
+            worlds.append((ground, facing))
+        else:
+            worlds.append((place + quaternion.rotate(turn, joint.position), quaternion.multiply(turn, joint.rotation)))
+    return worlds
+
+
+def _relative(world, parent) -> tuple[np.ndarray, np.ndarray]:
+    """A place and turn in the world, (T, 3) and (T, 4), as seen from a parent's."""
+    back = quaternion.inverse(parent[1])
+    return quaternion.rotate(back, world[0] - parent[0]), quaternion.multiply(back, world[1])
+
+
+def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
+    """The joints that stood above the hips, put back."""
+    worlds, out = _chain(motion, above) if above else [], []
+    for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
+        place, turn = _relative(world, parent)
+        place = place if joint.moves else joint.position[None]
+        out.append(_joint(joint.name, depth, joint.channels, place, turn, np.zeros((0, 3))))
+    return out
+
+
+def _hips_below(motion: Motion, above: tuple[RootAbove, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """The hips' positions (T, 3) and rotations (T, 4) relative to the joints above them."""
+    hips = (motion.root_positions, motion.rotations[:, 0])
+    return _relative(hips, _chain(motion, above)[-1]) if above else hips
+
+
+def _text(joints: list[_Joint], fps: float) -> Iterator[str]:
+    """The file, piece by piece."""
+    yield "HIERARCHY\n"
+    for joint, depth_after in zip(joints, [j.depth for j in joints[1:]] + [0]):
+        yield from _joint_text(joint)
+        for depth in range(joint.depth, depth_after - 1, -1):
+            yield "\t" * depth + "}\n"
+    values = np.concatenate([joint.columns for joint in joints], axis=1)
+    yield f"MOTION\nFrames: {len(values)}\nFrame Time: {1.0 / fps:.10g}\n"
+    row = " ".join(["%.6f"] * values.shape[1]) + "\n"
+    # adding 0 turns the -0.0 that rounding leaves into 0.0
+    yield from (row % tuple(frame) for frame in (np.round(values, 6) + 0.0).tolist())
+
+
+def _joint_text(joint: _Joint) -> Iterator[str]:
+    """A joint's lines, its bracket left open."""
+    tabs = "\t" * joint.depth
+    yield f"{tabs}{'JOINT' if joint.depth else 'ROOT'} {joint.name}\n{tabs}{{\n{tabs}\t{_offset(joint.offset)}"
+    yield f"{tabs}\tCHANNELS {' '.join([str(len(joint.channels)), *joint.channels])}\n"
+    for end in joint.ends:
+        yield f"{tabs}\tEnd Site\n{tabs}\t{{\n{tabs}\t\t{_offset(end)}{tabs}\t}}\n"
+
+
+def _offset(vector: np.ndarray) -> str:
+    return "OFFSET %.6f %.6f %.6f\n" % tuple(np.round(vector, 6) + 0.0)

@@ -1,0 +1,1 @@
+"""Events of a match: providers' files and plain tables."""

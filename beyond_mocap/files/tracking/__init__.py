@@ -1,0 +1,1 @@
+"""Positional tracking: the contract's own CSV and providers' files."""

@@ -1,0 +1,217 @@
+"""The providers of tracking, one record each, and the files of a match that belong together.
+
+All that is special to a provider stands in its record, and in the functions that only this record names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import re
+from functools import partial
+from pathlib import Path
+
+from ...base.errors import InputError
+from .feed import Feed, Files, TrackingProvider, find_provider, load_through_kloppy, read_head
+from .referees import read_signality_referees, read_sportec_referees, read_tracab_referees
+
+_META_NAMES = ("{}_meta.xml", "{}_meta.json", "{}_metadata.xml", "{}_metadata.json", "{}.xml", "{}.json")
+
+
+def find_feed(path: str | os.PathLike, meta: str | os.PathLike | None, provider: str | None) -> tuple[Feed, list[str]]:
+    """The files that belong together, and what was guessed of them; arguments and errors as for `read_match`."""
+    path, notes = _check_file(path), []
+    if provider and provider.lower() not in PROVIDERS:
+        raise InputError("provider", f"{provider.lower()!r}", f"one of {', '.join(PROVIDERS)}")
+    record = PROVIDERS[provider.lower()] if provider else _guess_provider(path, notes)
+    second = _check_file(meta) if meta else _find_metadata(path, record, notes) if record.needs_metadata else None
+    return Feed(record, *record.find_files(path, second, notes)), notes
+
+
+def load_tracking(feed: Feed, pitch: tuple[float, float]):
+    """kloppy's dataset in the provider's own coordinates; pitch: length and width, m, for a feed without them.
+    InputError where kloppy is not installed or cannot read the files."""
+    record, files, half = feed.provider, list(map(str, feed.tracking)), len(feed.tracking) // 2
+    meta, more, *_ = [*map(str, feed.meta), None, None]
+    known = {"raw": files[0], "all": files, "first": files[:half], "second": files[half:], "meta": meta, "more": more,
+             "length": pitch[0], "width": pitch[1]}  # fmt: skip
+    arguments = {key: known[name] for key, name in record.arguments.items()}
+    if feed.by_teams:
+        arguments = {"home_data": files[0], "away_data": files[1]}
+    arguments["coordinates"] = record.coordinates or record.name
+    others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
+    loader = record.team_loader if feed.by_teams else record.loader
+    return load_through_kloppy(feed.path, record.name, loader, arguments, f"{record.name} tracking", others)
+
+
+def _check_file(path: str | os.PathLike) -> Path:
+    if not Path(path).is_file():
+        found = "is a folder" if Path(path).is_dir() else "no such file"
+        raise InputError(path, found, "a tracking file", "check the path")
+    return Path(path)
+
+
+def _guess_provider(path: Path, notes: list[str]) -> TrackingProvider:
+    record = find_provider(path, PROVIDERS)
+    if record is not None:
+        notes.append(f"{path.name} read as {record.name}")
+        return record
+    if not read_head(path).strip():
+        raise InputError(path, "an empty file", "positions", "export it again")
+    expected = f"a CSV file with time_s,x_m,y_m, or one of {', '.join(PROVIDERS)}"
+    raise InputError(path, "a form that is not known", expected, "name the columns so, or the provider")
+
+
+def _find_metadata(path: Path, record: TrackingProvider, notes: list[str]) -> Path:
+    """The metadata file that the tracking file's name leads to."""
+    names = [path.name.replace(a, b) for a, b in record.renamed if a in path.name]
+    names += [form.format(path.stem) for form in _META_NAMES]
+    for name in names:
+        beside = path.with_name(name)
+        if beside.is_file() and beside != path:
+            notes.append(f"{name} taken as its {'second' if beside.suffix == path.suffix else 'metadata'} file")
+            return beside
+    raise InputError(
+        path, f"no metadata file beside it for {record.name}", names[0],
+        "put it there, or name it (--meta, in Blender Metadata)",
+    )
+
+
+def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
+    """The one other file that a provider needs, with `word` in its own or its folder's name; of several the one that
+    shares the numbers in the metadata's or the tracking file's name."""
+    folders = {meta.parent, path.parent, *(one for one in meta.parent.parent.glob("*") if word in one.name.lower())}
+    found = sorted(
+        one for folder in folders if folder.is_dir() for one in folder.glob("*.json")
+        if word in f"{folder.name}/{one.name}".lower() and one != meta
+    )  # fmt: skip
+    numbers = set(re.findall(r"\d+", f"{meta.stem} {path.stem}"))
+    fitting = [one for one in found if numbers & set(re.findall(r"\d+", one.stem))]
+    chosen = fitting if len(fitting) == 1 else found
+    if len(chosen) != 1:
+        raise InputError(
+            meta, f"{len(chosen)} files with '{word}' in their names beside it", "one that belongs to this match",
+            "put it there, and others away",
+        )
+    notes.append(f"{chosen[0].name} taken as its {word} file")
+    return chosen[0]
+
+
+def _find_number(pattern: bytes, content: bytes) -> str | None:
+    found = re.search(pattern, content)
+    return found and found[1].decode("utf-8", "replace")
+
+
+_find_sportec_number = partial(_find_number, rb'MatchId="([^"]{1,60})"')
+
+
+def _find_metrica(path: Path, meta: Path, notes: list[str]) -> Files:
+    """CSV, a file for each team, or EPTS, text with XML."""
+    if path.suffix.lower() != ".csv":
+        return (path,), (meta,)
+    return ((meta, path) if "away" in path.name.lower() else (path, meta)), ()
+
+
+def _find_secondspectrum(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A JSON beside the XML brings names."""
+    names = meta.with_suffix(".json")
+    if meta.suffix.lower() != ".xml" or not names.is_file():
+        return (path,), (meta,)
+    notes.append(f"{names.name} taken for the names of the players")
+    return (path,), (meta, names)
+
+
+def _find_pff(path: Path, meta: Path, notes: list[str]) -> Files:
+    return (path,), (meta, _find_beside(meta, "roster", path, notes))
+
+
+def _find_pff_number(metadata: bytes) -> str | None:
+    with contextlib.suppress(ValueError, TypeError, KeyError, IndexError):
+        value = json.loads(metadata)
+        return str((value[0] if isinstance(value, list) else value)["id"])
+    return None
+
+
+def _find_signality(path: Path, meta: Path, notes: list[str]) -> Files:
+    """A file for each half, where the name has p1 or p2 in it, and the venue."""
+    names = [re.sub(r"(?i)(?<![a-z0-9])(p)[1-5](?![0-9])", rf"\g<1>{number}", path.name) for number in range(1, 6)]
+    found = tuple(dict.fromkeys(path.with_name(name) for name in names if path.with_name(name).is_file()))
+    notes += [f"{', '.join(one.name for one in found)} taken as one match"] * (len(found) > 1)
+    return found or (path,), (meta, _find_beside(meta, "venue", path, notes))
+
+
+def _find_hawkeye(path: Path, meta: Path | None, notes: list[str]) -> Files:
+    """All files of a folder, one a minute: the players', then as many of the ball."""
+    def minute(file: Path) -> list[int]:
+        return [int(number) for number in re.findall(r"\d+", file.name)]
+
+    players = sorted(path.parent.glob("*.samples.centroids"), key=minute)
+    balls = sorted(path.parent.glob("*.samples.ball"), key=minute)
+    if not players or [minute(file) for file in players] != [minute(file) for file in balls]:
+        found = f"{len(players)} files of players and {len(balls)} of the ball"
+        raise InputError(path.parent, found, "one .samples.ball for every .samples.centroids", "complete the folder")
+    notes.append(f"{len(players)} files of players and of the ball in {path.parent.name or path.parent} taken")
+    return (*players, *balls), (meta,) if meta else ()
+
+
+# in the order of the choices that saved scenes number: a new one goes to the end
+PROVIDERS: dict[str, TrackingProvider] = {record.name: record for record in (
+    TrackingProvider(
+        name="tracab", title="TRACAB", files="`.dat` or `.json`, metadata `.xml` or `.json`; referees too",
+        patterns=(rb"\s*\d+:-?\d+,-?\d+,-?\d+,-?\d+,-?\d+,", rb'\s*\{[^{]{0,200}"FrameData"'),
+        read_referees=read_tracab_referees,
+    ),
+    TrackingProvider(
+        name="metrica", title="Metrica", files="CSV, a file per team; or EPTS text with its XML",
+        patterns=(rb"(?i)\s*,,,(Home|Away|[^,\r\n]*),", rb"(?i)\s*\d+:(-?\d*\.\d+|NaN),(-?\d*\.\d+|NaN)"),
+        renamed=(("Home", "Away"), ("home", "away"), ("Away", "Home"), ("away", "home")),
+        find_files=_find_metrica, loader="load_tracking_epts", team_loader="load_tracking_csv",
+    ),
+    TrackingProvider(
+        name="skillcorner", title="SkillCorner", files="`.json` or `.jsonl` with the match's JSON",
+        patterns=(rb'(?s)\s*[\[{].{0,4000}("trackable_object"|"image_corners_projection"|"player_data")',),
+    ),
+    TrackingProvider(
+        name="sportec", title="Sportec (DFL)",
+        files="positions XML with the match information XML; referees, colours of shirts",
+        patterns=(rb"(?s)\s*<.{0,4000}<Positions\b",), loader="load_tracking",
+        number_in_tracking=_find_sportec_number, number_in_metadata=_find_sportec_number,
+        read_referees=read_sportec_referees,
+    ),
+    TrackingProvider(
+        name="secondspectrum", title="Second Spectrum",
+        files="`.jsonl` with its XML (a JSON of the same name brings names), or with its JSON",
+        patterns=(rb'(?s)\s*\{(?!.{0,400}"gameRefId").{0,4000}"homePlayers"',), find_files=_find_secondspectrum,
+        arguments={"meta_data": "meta", "raw_data": "raw", "additional_meta_data": "more"}, has_own_roster=True,
+    ),
+    TrackingProvider(
+        name="statsperform", title="Stats Perform", files="MA25 text with MA1", patterns=(rb"\s*\d{10,};\d",),
+        loader="load_tracking", coordinates="sportvu", has_pitch_size=False,
+        arguments={"ma1_data": "meta", "ma25_data": "raw", "pitch_length": "length", "pitch_width": "width"},
+    ),
+    TrackingProvider(
+        name="pff", title="PFF",
+        files="`.jsonl`, metadata, and the roster (in the same folder, or in one with `roster` in its name); colours "
+              "of shirts",
+        patterns=(rb'(?s)\s*\{.{0,400}"gameRefId"',), find_files=_find_pff, loader="load_tracking",
+        arguments={"meta_data": "meta", "raw_data": "raw", "roster_meta_data": "more"},
+        number_in_tracking=partial(_find_number, rb'"gameRefId"\s*:\s*"?(\d+)'), number_in_metadata=_find_pff_number,
+    ),
+    TrackingProvider(
+        name="signality", title="Signality",
+        files="`..p1...json` (the other half's is found by its name), metadata, and the file with `venue` in its "
+              "name; referees",
+        patterns=(rb'(?s)\s*\[\s*\{.{0,400}"utc_time"',), find_files=_find_signality,
+        arguments={"meta_data": "meta", "raw_data_feeds": "all", "venue_information": "more"},
+        read_referees=read_signality_referees,
+    ),
+    TrackingProvider(
+        name="hawkeye", title="HawkEye",
+        files="any file of a folder: all its `.samples.centroids` and `.samples.ball` are taken; metadata if there is "
+              "any",
+        patterns=(rb'(?s)\s*\{\s*"details"\s*:.{0,4000}"heId"',), find_files=_find_hawkeye, needs_metadata=False,
+        arguments={"player_centroid_feeds": "first", "ball_feeds": "second", "meta_data": "meta",
+                   "pitch_length": "length", "pitch_width": "width"},
+    ),
+)}  # fmt: skip

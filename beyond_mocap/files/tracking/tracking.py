@@ -1,0 +1,220 @@
+"""Positional tracking in: the contract's own CSV by itself, providers' files through kloppy, converted to arrays once.
+
+Inside: metres from the pitch's centre, x along its length, y to the left of +x, seconds.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...motion.skeleton import frozen_array
+from ...motion.track import Track
+from . import match_arrays
+from .feed import Feed
+from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
+from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
+from .match_repairs import mended_ball, mended_players, mended_sides, side_lines
+from .providers import find_feed, load_tracking
+from .referees import described_referee, referee_samples
+from ..tables import number, read_rows
+from .team_colours import team_colours
+from ..whole import atomic_write
+
+RATES = (5.0, 100.0)
+"""Samples per second that a track may have."""
+
+_BALL = ("ball_x_m", "ball_y_m", "ball_z_m")
+_CACHE_VERSION = 3
+_ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams", "lines")
+
+
+def read_track_csv(path: str | os.PathLike) -> Track:
+    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, other columns ignored, as the file
+    has it.
+
+    Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
+    `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
+    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
+    """
+    rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
+    names = rows[0][1] if rows else {}
+    player = _cells(rows, ("time_s", "x_m", "y_m"))
+    ball = np.full((len(rows), 3), np.nan)
+    if "ball_x_m" in names and "ball_y_m" in names:
+        ball = _cells(rows, [name for name in _BALL if name in names])
+        ball = np.pad(ball, ((0, 0), (0, 3 - ball.shape[1])), constant_values=np.nan)
+    track = Track(player[:, 0], player[:, 1:], ball, name=Path(path).name)
+    _check_rate(track, path)
+    return track
+
+
+def _cells(rows, names) -> np.ndarray:
+    """(N, k) numbers of some columns, NaN for blank cells."""
+    cells = [[number(row[name], name, place, blank=True) for name in names] for place, row in rows]
+    return np.array(cells, dtype=float).reshape(len(rows), len(names))
+
+
+def _check_rate(track: Track, path) -> None:
+    known = np.isfinite(track.times) & track.measured
+    if len(np.unique(track.times[known])) < 2:
+        found = f"{np.count_nonzero(known)} samples with a time of their own and a position"
+        raise InputError(path, found, "at least two", "export it again")
+    rate = 1.0 / track.interval
+    if not RATES[0] - 0.01 <= rate <= RATES[1] + 0.5:
+        raise InputError(path, f"{rate:.3g} samples per second", "5 to 100", "check that time_s is in seconds")
+
+
+def read_match(
+    path: str | os.PathLike,
+    meta: str | os.PathLike | None = None,
+    provider: str | None = None,
+    cache_dir: str | os.PathLike | None = None,
+    pitch: tuple[float, float] | None = None,
+) -> Match:
+    """A provider's tracking file as arrays; the second time from a cache of them.
+
+    meta: the provider's metadata, for Metrica's CSV the other team's file; where None, a file beside `path` whose name
+    fits is taken, as are further files that a provider has (rosters, other halves). provider: one of
+    `providers.PROVIDERS`; where None, guessed from the content. cache_dir: where arrays are kept, keyed by the content
+    of all files; by default the user's cache folder. pitch: length and width in metres for feeds that have none
+    (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes, and all that was put
+    right in its report. InputError where files are missing, not of that form or not of one match, and where kloppy is
+    not installed.
+    """
+    feed, notes = find_feed(path, meta, provider)
+    cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"
+    arrays = _cached(cache)
+    if arrays is None:
+        arrays = _read(feed, pitch)
+        _keep(cache, arrays, notes)
+    return _match(arrays, feed, notes)
+
+
+def _read(feed: Feed, pitch: tuple[float, float] | None) -> dict[str, np.ndarray]:
+    """The match's arrays from its files; of a file that ends within a line, those before."""
+    check_same_match(feed)
+    size = pitch or match_arrays.USUAL_PITCH
+    try:
+        return _arrays(load_tracking(feed, size), feed, pitch)
+    except InputError:
+        if not feed.by_lines or all(path.read_bytes()[-1:] == b"\n" for path in feed.tracking):
+            raise
+        with whole_lines(feed) as shorter:
+            try:
+                dataset = load_tracking(shorter, size)
+            except InputError:
+                dataset = None
+        if dataset is None:
+            raise
+    told = "the file ends within a line: all before it is kept"
+    return _arrays(dataset, feed, pitch, [told])
+
+
+def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) -> dict[str, np.ndarray]:
+    """The match as named arrays, everything that the cache keeps."""
+    records = match_arrays.records_of(dataset)
+    lines = [*lines, *check_rows(feed), *check_periods(records, dataset, feed)]
+    players = match_arrays.tracked_players(records)
+    lines += check_players(players, dataset, feed)
+    times, periods = match_arrays.clock(records)
+    length, width, guessed = match_arrays.pitch_of(dataset, pitch, feed.provider.has_pitch_size)
+    metric = match_arrays.to_metres(dataset.metadata.coordinate_system, length, width, upward=feed.by_teams)
+    ball = match_arrays.ball_samples(records)
+    ball = np.concatenate([metric(ball[:, :2]), ball[:, 2:] * match_arrays.height_unit(dataset)], axis=1)
+    referees, places, of_referees = referee_samples(feed, np.array([frame.frame_id for frame in records]))
+    who = [*map(match_arrays.described, players), *map(described_referee, referees)]
+    positions = metric(np.concatenate([match_arrays.player_samples(records, players), places]))
+    positions, more = mended_players(times, positions, length, width, [one[0] for one in who])
+    ball, of_ball = mended_ball(ball, length, width)
+    spans, teams = [one[:2] for one in periods], [one[1] for one in who]
+    positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
+    turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
+    return {
+        "times": times,
+        "positions": positions,
+        "ball": ball,
+        "players": np.array(who, dtype=str).reshape(len(who), 5),
+        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
+        "periods": np.array(periods),
+        "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
+        "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
+    }
+
+
+def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
+    """Ground, name and colour of the home and the away team."""
+    colours = team_colours(feed)
+    names = {str(team.ground): str(team.name or "") for team in dataset.metadata.teams}
+    return [(ground, names.get(ground, ""), colours[ground]) for ground in ("home", "away")]
+
+
+def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match:
+    length, width, guessed, fps = arrays["pitch"].tolist()
+    notes = [*notes, f"no pitch size in the feed, {length:g} x {width:g} m taken"] if guessed else notes
+    players = tuple(
+        MatchPlayer(id_, team, name, int(shirt), position)
+        for id_, team, name, shirt, position in arrays["players"].tolist()
+    )
+    referees = (Team(REFEREE, "referees"),) if any(player.team == REFEREE for player in players) else ()
+    match = Match(
+        times=frozen_array(arrays["times"]),
+        players=players,
+        positions=frozen_array(arrays["positions"]),
+        ball=frozen_array(arrays["ball"]),
+        length=length,
+        width=width,
+        fps=fps,
+        provider=feed.provider.name,
+        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
+        notes=tuple(notes),
+        teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
+        passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
+    )
+    return replace(match, report=(*notes, *arrays["lines"].tolist(), *presence_lines(match)))
+
+
+def _cache_folder(folder: str | os.PathLike | None) -> Path:
+    if folder is not None:
+        return Path(folder)
+    home = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(home) / "beyond_mocap" / "tracking"
+
+
+def _key(feed: Feed, pitch: tuple[float, float] | None) -> str:
+    """Names the arrays of these contents, whatever the files are called."""
+    digest = hashlib.sha256(f"{_CACHE_VERSION} {feed.provider.name} {pitch}".encode())
+    for file in (*feed.tracking, *feed.meta):
+        with open(file, "rb") as stream:
+            digest.update(hashlib.file_digest(stream, "sha256").digest())
+    return digest.hexdigest()[:40]
+
+
+def _cached(cache: Path) -> dict[str, np.ndarray] | None:
+    """The kept arrays; None where there are none, or none that can be read whole."""
+    try:
+        with np.load(cache, allow_pickle=False) as kept:
+            arrays = {name: kept[name] for name in _ARRAYS}
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's and numpy's own ways
+        return None
+    count, who = arrays["times"].size, arrays["players"].size // 5
+    shapes = {"times": (count,), "positions": (who, count, 2), "ball": (count, 3), "pitch": (4,), "players": (who, 5)}
+    fits = all(arrays[name].shape == shape for name, shape in shapes.items())
+    return arrays if fits and arrays["periods"].shape[1:] == (4,) and arrays["teams"].shape[1:] == (3,) else None
+
+
+def _keep(cache: Path, arrays: dict[str, np.ndarray], notes: list[str]) -> None:
+    """Writes the cache whole; a folder that cannot be written costs the next run its time, and is told."""
+    content = io.BytesIO()
+    np.savez(content, **arrays)
+    try:
+        cache.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write(cache, content.getvalue())
+    except (OSError, InputError):
+        notes.append(f"{cache.parent} cannot be written, so nothing is kept for the next time")

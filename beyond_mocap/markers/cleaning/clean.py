@@ -1,0 +1,232 @@
+"""The clean-up of a trial: swaps mended, jumps taken out, unlabeled markers named, gaps filled (Fredriksson §5.1).
+
+He did this by hand, for four of his seven subjects. Here each marker is seen from the markers that move with it
+(`carriers`), and only what contradicts them clearly is touched; a clean trial comes back as it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.errors import Cancelled, InputError
+from ...base.runs import runs
+from .carriers import carriers, softness
+from .clean_report import CleanReport, Stretch
+from .gaps import Longest, fill
+from .jumps import take_out
+from .pieces import leaps
+from .swaps import mend, there_and_back
+from ..trial import MarkerTrial
+from .unlabeled import assign, unlabeled
+
+# a marker this much farther from its place than its tolerance for this long is told, s
+_STRAYED, _FOR = 1.5, 0.1
+# within so many frames of a leap or a gap
+_NEAR_BREAK = 3
+
+
+@dataclass(frozen=True)
+class CleanSettings:
+    """What the clean-up does. longest_gap, longest_soft_gap, longest_spline: seconds up to which a gap is filled by
+    markers that carry the missing one firmly, softly, and by a curve alone; 0 fills none that way."""
+
+    swaps: bool = True
+    jumps: bool = True
+    assign: bool = True
+    longest_gap: float = 2.0
+    longest_soft_gap: float = 0.25
+    longest_spline: float = 0.1
+
+    def __post_init__(self):
+        for name in ("longest_gap", "longest_soft_gap", "longest_spline"):
+            value = getattr(self, name)
+            if not 0.0 <= value < np.inf:
+                raise InputError(name, f"{value:g} s", "0 or more seconds")
+
+
+class Cleaned(NamedTuple):
+    """A cleaned trial (the same labels, without unlabeled markers that were all given away) and what was done."""
+
+    trial: MarkerTrial
+    report: CleanReport
+
+    def for_pose(self, longest: float = 0.08) -> MarkerTrial:
+        """The trial without what was filled softly or by a curve over more than `longest` seconds: good to look at, no
+        evidence for a pose."""
+        positions = np.array(self.trial.positions)
+        for gap in self.report.gaps:
+            if gap.how != "cluster" and gap.frames > longest * self.trial.fps:
+                first = round((gap.start - self.trial.start) * self.trial.fps)
+                positions[first : first + gap.frames, self.trial.index(gap.labels[0])] = np.nan
+        return self.trial.with_positions(positions)
+
+
+@dataclass
+class _Work:
+    """A trial under the clean-up: its places as they are now, and what was found."""
+
+    trial: MarkerTrial
+    positions: np.ndarray
+    clusters: list[list[int]]
+    nameless: list[int]
+    ask: Callable[[], None]
+    found: dict = field(default_factory=dict)
+    carried: dict = field(default_factory=dict)
+    soft: np.ndarray | None = None
+
+    def look(self):
+        """See which markers carry which."""
+        named = [i for i in range(len(self.trial.labels)) if i not in self.nameless and self.seen(i)]
+        self.soft = softness(self.positions, self.clusters)
+        self.soft[self.nameless], self.soft[:, self.nameless] = np.inf, np.inf
+        self.carried = carriers(self.positions, self.soft, named, ask=self.ask)
+
+    def look_again(self, changed: Sequence[int]):
+        """See it anew where a few samples of these markers have changed."""
+        named = [i for i in self.carried if self.seen(i)]
+        self.carried = carriers(self.positions, self.soft, named, self.carried, changed, self.ask)
+
+    def seen(self, marker):
+        return np.isfinite(self.positions[:, marker, 0]).any()
+
+    def stretch(self, labels, first, end, how="", off=0.0, frames=None):
+        """The stretch of these markers' frames, in seconds."""
+        clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
+        names = tuple(self.trial.labels[i] for i in labels)
+        return Stretch(names, float(clock[0]), float(clock[1]), frames or end - first, how, float(off))
+
+
+def clean(
+    trial: MarkerTrial,
+    clusters: Mapping[str, Sequence[str]] | None = None,
+    settings: CleanSettings = CleanSettings(),
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Cleaned:
+    """A trial without swaps, jumps and the gaps that can be filled, and a report.
+
+    clusters: segment -> labels of its markers, where a marker set is known (labels that the trial lacks are skipped);
+    None: what moves together is found from the trial alone. Raises Cancelled.
+    """
+    clusters = clusters or {}
+    known = [label for labels in clusters.values() for label in labels]
+    index = {label: i for i, label in enumerate(trial.labels)}
+    work = _Work(
+        trial, np.array(trial.positions),
+        [[index[label] for label in labels if label in index] for labels in clusters.values()],
+        unlabeled(trial.labels, known), lambda: _go_on(cancelled),
+    )
+    work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
+    steps = [("who carries whom", _Work.look)]
+    steps += [("swaps", _swaps)] if settings.swaps else []
+    steps += [("jumps", _jumps)] if settings.jumps else []
+    steps += [("unlabeled markers", _names)] if settings.assign and work.nameless else []
+    steps += [("gaps", lambda work: _gaps(work, settings))]
+    for number, (text, step) in enumerate(steps):
+        work.ask()
+        if progress:
+            progress(number / len(steps), f"markers: {text}")
+        if len(trial) and trial.labels:
+            step(work)
+    if progress:
+        progress(1.0, "markers: clean")
+    return _told(work)
+
+
+def _go_on(cancelled):
+    if cancelled and cancelled():
+        raise Cancelled("clean-up stopped")
+
+
+def _swaps(work):
+    work.positions, found = there_and_back(work.positions, work.carried)
+    _note_swaps(work, found)
+    leaping = leaps(work.positions, work.carried, work.trial.fps)
+    work.positions, found = mend(work.positions, work.carried, leaping, work.trial.fps, _opposite(work), work.ask)
+    _note_swaps(work, found)
+
+
+def _note_swaps(work, found):
+    work.found["swaps"] += tuple(
+        work.stretch([i for pair in swap.pairs for i in pair], swap.first, swap.end, "mended" if swap.mended else "")
+        for swap in found
+    )
+    if found:
+        work.look()
+
+
+def _opposite(work):
+    """Pairs of left and right markers, and for each segment all of its pairs together."""
+    index = {label: i for i, label in enumerate(work.trial.labels)}
+    pairs = {}
+    for label, i in index.items():
+        other = index.get("R" + label[1:]) if label[:1] == "L" else None
+        if other is not None and i in work.carried and other in work.carried:
+            pairs[i] = (i, other)
+    groups = [tuple(pairs[i] for i in cluster if i in pairs) for cluster in work.clusters]
+    return [(pair,) for pair in pairs.values()] + [group for group in groups if len(group) > 1]
+
+
+def _jumps(work):
+    positions, found = take_out(work.positions, work.carried, work.trial.fps)
+    work.positions = positions
+    work.found["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
+    if found:
+        work.look_again([jump.marker for jump in found])
+
+
+def _names(work):
+    positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
+    work.positions = positions
+    work.found["assigned"] = tuple(
+        work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
+    )
+    if found:
+        work.look_again([one.label for one in found])
+
+
+def _gaps(work, settings):
+    longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
+    work.found["strayed"] = tuple(_strayed(work))
+    filled, found = fill(work.positions, work.soft, work.trial.fps, longest, work.carried, work.ask)
+    work.positions = filled
+    for name, kept in (("gaps", True), ("left", False)):
+        work.found[name] = tuple(
+            work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is kept
+        )
+
+
+def _strayed(work):
+    """Markers that lie far from where their helpers say after a leap or a gap, or until one: put on anew, or labelled
+    wrongly. Where they go smoothly it is the body that moves."""
+    leaping = leaps(work.positions, work.carried, work.trial.fps)
+    broken = np.pad(leaping | np.isnan(work.positions[..., 0]), ((_NEAR_BREAK, _NEAR_BREAK), (0, 0)))
+    for marker, one in work.carried.items():
+        if not one.helpers:
+            continue
+        far = np.nan_to_num(one.away) > np.maximum(_STRAYED * one.tolerance, 0.06)
+        for first, end in runs(far):
+            edges = broken[first : first + 2 * _NEAR_BREAK + 1, marker], broken[end : end + 2 * _NEAR_BREAK + 1, marker]
+            if end - first >= _FOR * work.trial.fps and any(edge.any() for edge in edges):
+                yield work.stretch([marker], first, end, "", float(np.median(one.away[first:end])))
+
+
+def _told(work):
+    """The cleaned trial and its report."""
+    trial, seen = work.trial, work.trial.seen
+    share = {label: float(seen[:, i].mean()) if len(trial) else 0.0 for i, label in enumerate(trial.labels)}
+    keeps = [i for i in range(len(trial.labels)) if i not in work.nameless or work.seen(i)]
+    cleaned = trial.with_positions(work.positions).only([trial.labels[i] for i in keeps])
+    nameless = {trial.labels[i] for i in work.nameless}
+    report = CleanReport(
+        seen={label: part for label, part in share.items() if label not in nameless},
+        unnamed={
+            trial.labels[i]: float(np.isfinite(work.positions[:, i, 0]).mean()) for i in work.nameless if i in keeps
+        },
+        **work.found,
+    )
+    return Cleaned(cleaned, report)

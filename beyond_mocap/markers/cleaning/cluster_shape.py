@@ -1,0 +1,90 @@
+"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..frames import placed, rigid_fit, taken_back
+from .robust import median, medians, quantile
+
+_ROUNDS = 3
+_MOST_FRAMES = 100
+
+
+class Shape(NamedTuple):
+    """What stays of a cluster when its movement is taken away.
+
+    places: (N, 3) m in the cluster's own frame (about its middle, turned as in the frame it was begun with), NaN for a
+    marker that is never seen with the others. sigma: (N,) m, how far each marker usually is from its place (robust root
+    mean square). usual: m, the median over frames of the deformation (the fit's rms).
+    """
+
+    places: np.ndarray
+    sigma: np.ndarray
+    usual: float
+
+
+def mean_shape(positions: np.ndarray) -> Shape:
+    """The robust mean shape of one cluster (T, N, 3) m, unseen markers NaN: generalized Procrustes.
+
+    Every frame is laid on the shape by its best rigid motion, and the shape becomes the mean of what lies there; frames
+    and samples far off (swaps, ghosts) count ever less (Geman-McClure weights at three times the usual distance).
+    """
+    positions = np.asarray(positions, dtype=float)
+    chosen = positions[_spread_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
+    places = chosen[_middle_frame(chosen)]
+    seen = np.isfinite(places).all(axis=-1)
+    places = places - (places[seen].mean(axis=0) if seen.any() else 0.0)
+    weights = np.ones(chosen.shape[:2])
+    for _ in range(_ROUNDS):
+        fit = rigid_fit(places, chosen, weights)
+        back = taken_back(fit, chosen)
+        away = np.linalg.norm(back - places, axis=-1)
+        scale = 3.0 * max(median(away), 1e-4)
+        weights = np.where(np.isfinite(away), 1.0 / (1.0 + (away / scale) ** 2) ** 2, np.isfinite(back[..., 0]) * 1e-3)
+        weights = np.where(fit.sound[:, None], weights, 0.0)
+        total = weights.sum(axis=0)[:, None]
+        summed = np.einsum("tn,tnc->nc", weights, np.where(weights[..., None] > 0.0, back, 0.0))
+        places = np.where(total > 0.0, summed / np.maximum(total, 1e-12), places)
+    fit = rigid_fit(places, chosen, weights)
+    away = np.linalg.norm(placed(fit, places) - chosen, axis=-1)
+    return Shape(places, 1.4826 * medians(away), median(fit.rms[fit.sound]))
+
+
+def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(median distance, how much it varies, as a standard deviation) of each pair of markers (T, M, 3): (M, M) m each.
+
+    From the range that holds nine tenths of the frames, so that short swaps and ghosts count nothing; pairs hardly ever
+    seen together: inf; the diagonal: 0.
+    """
+    seen = np.isfinite(positions[..., 0])
+    chosen = positions[_spread_frames(seen.sum(axis=1))]
+    count = chosen.shape[1]
+    spread, middle = np.full((count, count), np.inf), np.zeros((count, count))
+    for marker in range(count):
+        distance = np.linalg.norm(chosen - chosen[:, marker : marker + 1], axis=-1)
+        together = np.isfinite(distance).sum(axis=0) >= min(10, len(chosen))
+        low, half, high = (quantile(distance[:, together], share) for share in (0.05, 0.5, 0.95))
+        spread[marker, together] = (high - low) / 3.29
+        middle[marker, together] = half
+    spread = np.fmin(spread, spread.T)
+    np.fill_diagonal(spread, 0.0)
+    return middle, spread
+
+
+def _spread_frames(seen_count):
+    """At most some hundred frames evenly over the trial, of those that see the most markers."""
+    full = np.flatnonzero(seen_count >= max(3, 0.8 * seen_count.max(initial=0)))
+    if not len(full):
+        full = np.arange(len(seen_count))
+    return full[np.unique(np.linspace(0, len(full) - 1, min(len(full), _MOST_FRAMES)).astype(int))]
+
+
+def _middle_frame(positions):
+    """The frame whose distances between markers lie nearest to their medians over the trial."""
+    distance = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=-1)
+    away = np.abs(distance - medians(distance))
+    missing = np.isnan(away).sum(axis=(1, 2))
+    return int(np.argmin(np.nansum(away, axis=(1, 2)) + 10.0 * missing))

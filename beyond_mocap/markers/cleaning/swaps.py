@@ -1,0 +1,294 @@
+"""Swaps: two markers that have each other's label for a stretch, found by what their clusters say and by their ways.
+
+A label that is exchanged deforms the markers around it, and exchanging it back mends them; both are asked for. Where no
+cluster tells, two leaps in which each marker goes on where the other one was, there and back, tell as much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...base.runs import runs
+from .carriers import Carried
+from ..frames import placed, rigid_fit
+from .robust import median
+
+# exchanging must bring the deformation down to this part of it and by this much, m
+_PART, _LESS = 0.6, 0.008
+# which must have been more than this many times the usual
+_STRANGE = 2.0
+# and to no more than this, m, or this many times what is usual there, or this part of it
+_WELL, _TIMES_USUAL, _FAR_LESS = 0.015, 2.5, 0.25
+# how often the slow questions are asked, s; a swap shorter than this is only found by its leaps
+_EVERY = 0.025
+# two markers leap onto each other's ways if they are this far apart, m, and miss them by no more than this part of it
+_APART, _TURNED = 0.03, 0.4
+# where more than this are found, something else is wrong
+_MOST_SWAPS = 200
+
+Pairs = tuple[tuple[int, int], ...]
+
+
+class Swap(NamedTuple):
+    """Markers that had each other's labels from frame `first` up to, not with, `end`; `mended` or only told."""
+
+    pairs: Pairs
+    first: int
+    end: int
+    mended: bool
+
+
+def exchanged(positions: np.ndarray, pairs: Pairs) -> np.ndarray:
+    """Positions (T, M, 3) with each pair's markers exchanged."""
+    order = np.arange(positions.shape[1])
+    for one, other in pairs:
+        order[one], order[other] = other, one
+    return positions[:, order]
+
+
+def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tuple[np.ndarray, list[Swap]]:
+    """(positions (T, M, 3) m with these swaps exchanged back, the swaps): pairs that leap onto each other's ways twice.
+
+    Between the leaps they are exchanged, unless their clusters say that they
+    are before and after.
+    """
+    out, found, deformed = positions.copy(), [], _Deformed(carried)
+    together: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for pair, frames in _moments(_crossings(positions)).items():
+        for stretch in zip(frames[::2], frames[1::2]):
+            together.setdefault(stretch, []).append(pair)
+    for (first, end), pairs in together.items():
+        for low, high in _wrong_side(deformed, out, tuple(pairs), first, end):
+            out[low:high] = exchanged(out[low:high], tuple(pairs))
+            found.append(Swap(tuple(pairs), low, high, True))
+    return out, found
+
+
+def mend(
+    positions: np.ndarray,
+    carried: Mapping[int, Carried],
+    leaping: np.ndarray,
+    fps: float,
+    opposite: Sequence[Pairs] = (),
+    ask: Callable[[], None] = lambda: None,
+) -> tuple[np.ndarray, list[Swap]]:
+    """(positions (T, M, 3) m with swaps exchanged back, the swaps): what deforms the clusters and mends them exchanged.
+
+    leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
+    whole segments of them: always asked about. The exchange that mends the most is made first, and the others are asked
+    about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a
+    single leap onto each other's ways is told.
+    """
+    out, found, deformed = positions.copy(), [], _Deformed(carried)
+    crossings = _crossings(positions)
+    step = max(1, int(_EVERY * fps))
+    asked = [pairs for pairs in _questions(positions, carried, crossings, fps, opposite) if deformed.told(pairs)]
+    offers = {}
+    for pairs in asked:
+        ask()
+        offers[pairs] = _offers(deformed, out, pairs, leaping, step)
+    for _ in range(_MOST_SWAPS):
+        rated = ((gain, pairs, first, end) for pairs, rows in offers.items() for gain, first, end in rows)
+        best = max(rated, default=None)
+        if best is None:
+            break
+        _, pairs, first, end = best
+        out[first:end] = exchanged(out[first:end], pairs)
+        found.append(Swap(pairs, first, end, True))
+        touched = deformed.touched_by(pairs)
+        for other in asked:
+            if other == pairs:
+                offers[other] = [row for row in offers[other] if row[1:] != (first, end)]
+            elif offers[other] and touched & {marker for pair in other for marker in pair}:
+                offers[other] = _offers(deformed, out, other, leaping, step)
+    found += _untold(crossings, deformed, found, len(positions))
+    return out, sorted(found, key=lambda swap: swap.first)
+
+
+def _offers(deformed, positions, pairs, leaping, step):
+    """[(gain, first, end)] of the stretches in which exchanging these pairs is called for."""
+    keep, swap = deformed.both_ways(positions[::step], pairs)
+    if not np.any(keep - swap > _LESS):
+        return []
+    keep, swap = deformed.both_ways(positions, pairs)
+    found = _stretches(keep, swap, deformed.usual(pairs), leaping[:, [i for pair in pairs for i in pair]])
+    return [(float(np.nansum((keep - swap)[first:end])) * 2 * len(pairs), first, end) for first, end in found]
+
+
+def _wrong_side(deformed, positions, pairs, first, end):
+    """The stretches in which these pairs are exchanged: between their two leaps, or before and after, or none."""
+    inside = [(first, end)]
+    if not deformed.told(pairs):
+        return inside if end - first <= len(positions) // 2 else [(0, first), (end, len(positions))]
+    keep, swap = deformed.both_ways(positions, pairs)
+    gain = keep - swap
+    middle = median(gain[first:end])
+    around = median(np.concatenate([gain[:first], gain[end:]]))
+    if middle < -_LESS and around > _LESS:
+        return [(0, first), (end, len(positions))]
+    return inside if middle > -_LESS or end - first <= len(positions) // 4 else []
+
+
+def _moments(crossings):
+    """{pair: frames at which its markers leap onto each other's ways}."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for frame, pairs in crossings:
+        for pair in pairs:
+            found.setdefault(pair, []).append(frame)
+    return found
+
+
+class _Deformed:
+    """How markers with their helpers are deformed, as they are labelled and with some exchanged."""
+
+    def __init__(self, carried):
+        self._carried = carried
+
+    def told(self, pairs: Pairs) -> bool:
+        """Whether any cluster would show that these markers are exchanged."""
+        return bool(self._telling(pairs))
+
+    def _telling(self, pairs):
+        """The markers whose shapes are asked: the pairs' own, or where those have none, those they help to carry."""
+        own = {marker for pair in pairs for marker in pair}
+        with_helpers = [marker for marker in sorted(own) if marker in self._carried and self._carried[marker].helpers]
+        return with_helpers or [other for other, one in self._carried.items() if own & set(one.helpers)]
+
+    def touched_by(self, pairs: Pairs) -> set[int]:
+        """All markers whose shape an exchange of these pairs changes."""
+        markers = {marker for pair in pairs for marker in pair}
+        return markers | {other for other, one in self._carried.items() if markers & set(one.helpers)}
+
+    def usual(self, pairs: Pairs) -> float:
+        """The median deformation of the pairs' shapes, m."""
+        ones = [self._carried[marker] for marker in self._telling(pairs)]
+        return float(np.mean([max(one.shape.usual, one.sigma / np.sqrt(len(one.helpers) + 1.0)) for one in ones]))
+
+    def both_ways(self, positions: np.ndarray, pairs: Pairs) -> tuple[np.ndarray, np.ndarray]:
+        """(T,) m each: mean deformation of the pairs' shapes as they are, and with the pairs exchanged; NaN if untold.
+        """
+        markers = self._telling(pairs)
+        keep, swap = (
+            np.stack([self._rms(version, marker) for marker in markers])
+            for version in (positions, exchanged(positions, pairs))
+        )
+        return tuple(
+            np.nansum(rms, axis=0) / np.where(np.isfinite(rms).any(axis=0), np.isfinite(rms).sum(axis=0), np.nan)
+            for rms in (keep, swap)
+        )
+
+    def _rms(self, positions, marker):
+        """(T,) m: how far marker and helpers are from their shape; NaN where it or too many are not seen."""
+        one = self._carried[marker]
+        places = np.vstack([one.place, one.shape.places])
+        sigma = np.append(one.sigma, one.shape.sigma)
+        seen = positions[:, [marker, *one.helpers]]
+        fit = rigid_fit(places, seen, 1.0 / (sigma**2 + 0.005**2))
+        away = np.linalg.norm(placed(fit, places) - seen, axis=-1)
+        count = np.isfinite(away).sum(axis=1)
+        rms = np.sqrt(np.nansum(away**2, axis=1) / np.maximum(count, 1))
+        return np.where(fit.sound & (count > 3) & np.isfinite(away[:, 0]), rms, np.nan)
+
+
+def _questions(positions, carried, crossings, fps, opposite):
+    """The exchanges worth asking about: those that leaps suggest, those that two strayed markers suggest, and the
+    likely ones if some frame speaks for them; groups before single pairs."""
+    asked: dict[Pairs, None] = {}
+    for _, pairs in crossings:
+        if len(pairs) > 1:
+            asked[pairs] = None
+    for pairs in opposite:
+        asked[tuple(pairs)] = None
+    for _, pairs in crossings:
+        for pair in pairs:
+            asked[(pair,)] = None
+    for pair in _strayed(positions, carried, fps):
+        asked[(pair,)] = None
+    return sorted(asked, key=lambda pairs: -len(pairs))
+
+
+def _strayed(positions, carried, fps):
+    """Pairs of markers that are each far from where their helpers say, and near where the other one's say."""
+    markers = [marker for marker, one in carried.items() if one.helpers]
+    if not markers:
+        return []
+    frames = np.arange(0, len(positions), max(1, int(_EVERY * fps)))
+    told = np.stack([carried[marker].predicted()[frames] for marker in markers], axis=1)
+    reach = np.array([carried[marker].tolerance for marker in markers])
+    where = positions[frames][:, markers]
+    off = np.linalg.norm(where - told, axis=-1) > reach
+    found: dict[tuple[int, int], None] = {}
+    for frame in np.flatnonzero(off.sum(axis=1) > 1):
+        bad = np.flatnonzero(off[frame])
+        across = np.linalg.norm(where[frame, bad][:, None] - told[frame, bad][None], axis=-1)
+        own = np.diagonal(across)
+        better = (across < reach[bad][None]) & (across < 0.5 * own[:, None])
+        for i, j in np.argwhere(np.triu(better & better.T, 1)):
+            found[(markers[bad[i]], markers[bad[j]])] = None
+    return list(found)
+
+
+def _stretches(keep, swap, usual, leaping):
+    """(first, end) of the frames in which the exchange is called for, from where it begins to be the better one."""
+    gain = keep - swap
+    well = (swap < max(_WELL, _TIMES_USUAL * usual)) | (swap < _FAR_LESS * keep)
+    clear = (gain > np.maximum(_LESS, (1.0 - _PART) * keep)) & well & (keep > _STRANGE * usual)
+    leap = leaping.any(axis=1)
+    found = []
+    for first, end in runs(~(gain <= 0.0)):  # better, or nothing tells
+        inside = np.flatnonzero(clear[first:end]) + first
+        if not len(inside):
+            continue
+        low, high = int(inside[0]), int(inside[-1]) + 1
+        known = np.flatnonzero(gain[first:end] > 0.0) + first
+        # the exchange began at a leap if there is one, else where it begins to be better
+        begun, over = np.flatnonzero(leap[first : low + 1]) + first, np.flatnonzero(leap[high : end + 1]) + high
+        found.append((int(begun[-1] if len(begun) else known[0]), int(over[0] if len(over) else known[-1] + 1)))
+    return found
+
+
+def _crossings(positions):
+    """[(frame, pairs)]: where markers go on, from one frame to the next, on each other's ways."""
+    was = np.full_like(positions, np.nan)
+    was[1:] = positions[:-1]
+    ahead = 2.0 * positions[1:-1] - positions[:-2]
+    was[2:] = np.where(np.isnan(ahead), was[2:], ahead)
+    leapt = np.nan_to_num(np.linalg.norm(positions - was, axis=-1)) > 0.5 * _APART
+    found = []
+    for frame in np.flatnonzero(leapt.sum(axis=1) > 1).tolist():
+        markers = np.flatnonzero(leapt[frame])
+        if pairs := _crossing(positions[frame, markers], was[frame, markers], markers):
+            found.append((frame, pairs))
+    return found
+
+
+def _crossing(now, was, markers):
+    """The pairs among `markers` whose arrow from one to the other turns round, about the middle between them.
+
+    now, was: (N, 3) m, where they are and where they should be by their ways. No segment turns round in one frame, and
+    markers that pass by each other do so on their ways.
+    """
+    arrow, awaited = now[None] - now[:, None], was[None] - was[:, None]
+    apart = np.linalg.norm(arrow, axis=-1)
+    miss = np.linalg.norm(arrow + awaited, axis=-1)
+    middle = 0.5 * np.linalg.norm((now - was)[None] + (now - was)[:, None], axis=-1)
+    turned = np.triu((apart > _APART) & (miss < _TURNED * apart) & (middle < _TURNED * apart), 1)
+    used: set[int] = set()
+    pairs = []
+    for i, j in sorted(np.argwhere(turned).tolist(), key=lambda pair: miss[tuple(pair)]):
+        if not {i, j} & used:
+            used |= {i, j}
+            pairs.append((int(markers[i]), int(markers[j])))
+    return tuple(sorted(pairs))
+
+
+def _untold(crossings, deformed, found, frames):
+    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there.
+    """
+    for pair, when in _moments(crossings).items():
+        known = any(pair in swap.pairs and swap.first - 3 <= when[-1] <= swap.end + 3 for swap in found)
+        if not known and not deformed.told((pair,)):
+            yield Swap((pair,), when[-1], frames, False)

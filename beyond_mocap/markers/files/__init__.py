@@ -1,0 +1,1 @@
+"""Files of optical markers (C3D, TRC), marker sets and MODEL.json."""

@@ -1,0 +1,150 @@
+"""Marker sets as small texts (docs/markers/markers.md), those of our own among them."""
+
+from __future__ import annotations
+
+import os
+import re
+from pathlib import Path
+
+from ...base.errors import InputError
+from ..model.landmarks import LANDMARKS
+from ..model.marker_set import MarkerSet
+from ..model.template import JOINTS
+from ...files.content import utf8
+
+SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
+LARGEST = 1_000_000
+"""Bytes of a file above which it is no marker set."""
+_FORM = "see docs/markers/markers.md"
+_LISTS = ("static", "optional", "ball", "other")
+_KEYWORDS = "marker set, about, segment JOINT, landmark NAME, also LABEL, static, optional, ball, other"
+
+
+def shipped_sets() -> tuple[MarkerSet, ...]:
+    """The sets that come with Beyond Mocap, by name."""
+    return tuple(sorted((read_marker_set(path) for path in SHIPPED.glob("*.txt")), key=lambda one: one.name))
+
+
+def chosen_set(named: str) -> MarkerSet:
+    """The shipped set of this name, else the one in the file of this path. InputError where there is neither."""
+    shipped = {one.name: one for one in shipped_sets()}
+    if named.strip().lower() in shipped:
+        return shipped[named.strip().lower()]
+    if not Path(named).exists():
+        found = f"no marker set {named[:60]!r}"
+        raise InputError("--marker-set", found, f"one of {', '.join(shipped)}, or a file", "check the name")
+    return read_marker_set(named)
+
+
+def read_marker_set(path: str | os.PathLike) -> MarkerSet:
+    """The set that a file holds. InputError, with the line, for whatever is wrong."""
+    return parse_marker_set(utf8(path, "a marker set", LARGEST), str(path))
+
+
+def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
+    """The set in a text; `name` stands before the line of what is wrong with it, as InputError."""
+    read = _Reading()
+    for number, line in enumerate(re.split(r"\r\n|\n|\r", text), 1):
+        line = re.sub(r"(^|\s)#.*", "", line).strip()
+        if line:
+            read.statement(line, f"{name}:{number}")
+    if not read.name:
+        raise InputError(name, "no line `marker set: NAME`", "the name of the set", _FORM)
+    if not read.segments:
+        raise InputError(name, "no segment", "a line such as `segment Hips: LASI, RASI, SACR`", _FORM)
+    try:
+        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about,
+                         **{key: tuple(labels) for key, labels in read.lists.items()})  # fmt: skip
+    except InputError as error:
+        raise InputError(name, str(error)) from None
+
+
+class _Reading:
+    """What has been read so far. Lines of one segment or landmark add up."""
+
+    def __init__(self):
+        self.name = self.about = ""
+        self.segments: dict[str, tuple[str, ...]] = {}
+        self.landmarks: dict[str, tuple[str, ...]] = {}
+        self.aliases: dict[str, str] = {}
+        self.lists: dict[str, tuple[str, ...]] = {}
+
+    def statement(self, line: str, place: str) -> None:
+        head, colon, said = (part.strip() for part in line.partition(":"))
+        if not colon:
+            raise InputError(place, f"{line[:40]!r}", "`what: labels`", _FORM)
+        word, _, rest = head.partition(" ")
+        whole, word, rest = " ".join(head.lower().split()), word.lower(), rest.strip()
+        if whole == "marker set":
+            self._named(said, place)
+        elif whole == "about":
+            self.about = said
+        elif whole in _LISTS:
+            self.lists[whole] = (*self.lists.get(whole, ()), *_labels(said, place))
+        elif word in ("segment", "landmark", "also") and rest:
+            getattr(self, f"_{word}")(rest, _labels(said, place), place)
+        else:
+            raise InputError(place, f"{head[:40]!r}", f"one of {_KEYWORDS}", _FORM)
+
+    def _named(self, said: str, place: str) -> None:
+        if self.name:
+            raise InputError(place, "a second `marker set`", "one set a file", "make it a file of its own")
+        if not re.fullmatch(r"[\w\-.]{1,60}", said):
+            raise InputError(place, f"name {said[:40]!r}", "one word of letters, digits, `_`, `-` and `.`", _FORM)
+        self.name = said
+
+    def _segment(self, joint: str, labels: tuple[str, ...], place: str) -> None:
+        if joint not in JOINTS:
+            raise InputError(place, f"no segment {joint[:40]!r}", f"one of {', '.join(JOINTS)}", "check the spelling")
+        self.segments[joint] = (*self.segments.get(joint, ()), *labels)
+
+    def _landmark(self, name: str, labels: tuple[str, ...], place: str) -> None:
+        if name not in LANDMARKS:
+            expected = f"one of {', '.join(sorted(LANDMARKS))}"
+            raise InputError(place, f"no landmark {name[:40]!r}", expected, "check the spelling")
+        self.landmarks[name] = (*self.landmarks.get(name, ()), *labels)
+
+    def _also(self, own: str, others: tuple[str, ...], place: str) -> None:
+        for other in others:
+            if self.aliases.setdefault(other, own) != own:
+                found = f"{other[:40]!r} for {self.aliases[other]!r} and {own!r}"
+                raise InputError(place, found, "one marker for each other label", "take one out")
+
+
+def _labels(said: str, place: str) -> tuple[str, ...]:
+    labels = tuple(" ".join(label.split()) for label in said.split(","))
+    if not all(labels):
+        raise InputError(place, "an empty label" if said else "no labels", "labels, separated by commas", _FORM)
+    if wrong := next((label for label in labels if ":" in label), None):
+        raise InputError(place, f"label {wrong[:40]!r}", "labels without a colon", "leave out the subject")
+    return labels
+
+
+def marker_set_text(marker_set: MarkerSet) -> str:
+    """The set as `read_marker_set` reads it. InputError for labels with a comma, a colon or ` #`."""
+    lines = [f"marker set: {marker_set.name}"]
+    lines += [f"about: {' '.join(marker_set.about.split())}"] if marker_set.about else []
+    lines += ["", *(f"segment {joint}: {_joined(labels)}" for joint, labels in marker_set.segments.items() if labels)]
+    lines += ["", *(f"landmark {name}: {_joined(labels)}" for name, labels in marker_set.landmarks.items() if labels)]
+    lists = {key: getattr(marker_set, key) for key in _LISTS}
+    lines += ["", *(f"{key}: {_joined(_in_order(labels))}" for key, labels in lists.items() if labels)]
+    others: dict[str, list[str]] = {}
+    for other, own in marker_set.aliases.items():
+        others.setdefault(own, []).append(other)
+    lines += [f"also {_written(own)}: {_joined(labels)}" for own, labels in others.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _in_order(labels) -> list[str]:
+    """Sets have no order of their own."""
+    return sorted(labels) if isinstance(labels, frozenset) else list(labels)
+
+
+def _joined(labels) -> str:
+    return ", ".join(_written(label) for label in labels)
+
+
+def _written(label: str) -> str:
+    if label != " ".join(label.split()) or not label or re.search(r"[,:]|(^|\s)#", label):
+        raise InputError("marker set", f"label {label[:40]!r}", "a label without comma, colon and ` #`", "rename it")
+    return label

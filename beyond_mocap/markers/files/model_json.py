@@ -1,0 +1,216 @@
+"""MODEL.json: the body that was found out of markers, with the markers on it, as a file (docs/markers/markers.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+
+import numpy as np
+
+from ...base.errors import InputError
+from ..model.model import BallMarker, Freedom, MarkerModel
+from ..trial import repeated
+from ...motion.skeleton import Skeleton
+from ...files.content import utf8
+from ...files.json_values import check_names, entries, number, numbers, object_of, text, truth
+from ...files.whole import atomic_write
+
+VERSION = 1
+LARGEST = 10_000_000
+"""Bytes of a file above which it is no model."""
+_PAGE = "docs/markers/markers.md"
+_TRIPLE = "[x, y, z] in metres"
+_FARTHEST = 100.0  # metres within a body
+_MOST = 10_000  # joints or markers
+_JOINT = ("name", "parent", "offset", "order", "free", "low", "high", "stiffness", "centre_sigma")
+_MARKER = ("label", "joint", "place", "sigma", "edge_sigma")
+_WHOLE = ("version", "subject", "sessions", "marker_set", "notes", "joints", "tips", "markers", "ball")
+
+
+def read_model(path: str | os.PathLike) -> MarkerModel:
+    """The model that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
+    return parse_model(utf8(path, "a MODEL.json", LARGEST), str(path))
+
+
+def write_model(model: MarkerModel, path: str | os.PathLike) -> None:
+    """Write a model as `read_model` reads it, number for number. InputError where it cannot be written."""
+    atomic_write(path, model_text(model))
+
+
+def model_text(model: MarkerModel) -> str:
+    """The text of a MODEL.json; one joint and one marker a line."""
+    skeleton, names = model.skeleton, model.skeleton.names
+    joints = [_joint_out(model, i) for i in range(len(skeleton))]
+    tips = [{"joint": names[parent], "offset": _list(offset)}
+            for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets)]  # fmt: skip
+    markers = [
+        {"label": label, "joint": names[model.joint[i]], "place": _list(model.places[i]),
+         "sigma": _number_out(model.sigma[i]), "edge_sigma": _number_out(model.edge_sigma[i])}
+        for i, label in enumerate(model.markers)
+    ]  # fmt: skip
+    rows: dict = {"version": VERSION, "subject": model.subject, "sessions": list(model.sessions),
+                  "marker_set": model.set_name, "notes": list(model.notes), "joints": joints, "tips": tips,
+                  "markers": markers}  # fmt: skip
+    if ball := model.ball:
+        centre = [float(value) for value in ball.centre]
+        rows["ball"] = {"label": ball.label, "joint": names[ball.joint], "centre": centre, "radius": float(ball.radius)}
+    return "{\n" + ",\n".join(f" {json.dumps(name)}: {_value_out(value)}" for name, value in rows.items()) + "\n}\n"
+
+
+def _joint_out(model: MarkerModel, i: int) -> dict:
+    skeleton, freedom = model.skeleton, model.freedom
+    parent = skeleton.parents[i]
+    return {
+        "name": skeleton.names[i],
+        "parent": None if parent < 0 else skeleton.names[parent],
+        "offset": _list(skeleton.offsets[i]),
+        "order": freedom.order[i],
+        "free": [bool(one) for one in freedom.free[i]],
+        "low": _list(freedom.low[i]),
+        "high": _list(freedom.high[i]),
+        "stiffness": float(model.stiffness[i]),
+        "centre_sigma": _number_out(model.centre_sigma[i]),
+    }
+
+
+def _value_out(value) -> str:
+    """JSON text; a list of objects has a line for each."""
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(f"  {json.dumps(one, ensure_ascii=False)}" for one in value) + "\n ]"
+    return json.dumps(value, ensure_ascii=False, allow_nan=False)
+
+
+def _list(values: np.ndarray) -> list:
+    return [_number_out(value) for value in values]
+
+
+def _number_out(value) -> float | None:
+    """null where there is no number, or no limit."""
+    return float(value) if math.isfinite(value) else None
+
+
+# -- reading
+
+
+def parse_model(said: str, name: str = "model") -> MarkerModel:
+    """The model in a text; `name` stands before what is wrong with it, as InputError."""
+    whole = object_of(said, name, _PAGE)
+    try:
+        return _model(whole)
+    except InputError as error:
+        raise InputError(name, str(error)) from None
+
+
+def _model(whole) -> MarkerModel:
+    check_names(whole, "the model", _WHOLE, ("version", "joints", "markers"))
+    if whole["version"] != VERSION or isinstance(whole["version"], bool):
+        raise InputError("version", str(whole["version"])[:40], str(VERSION), "it is of another Beyond Mocap")
+    joints = _objects(whole["joints"], "joint", _JOINT, ("name", "parent", "offset"))
+    names = [text(row["name"], f"joint {i}: name") for i, row in enumerate(joints, 1)]
+    if twice := repeated(names):
+        raise InputError("joints", f"{twice[0][:40]!r} twice", "unique names")
+    index = {name: i for i, name in enumerate(names)}
+    markers = _objects(whole["markers"], "marker", _MARKER, ("label", "joint", "place", "sigma"))
+    tips = _objects(whole.get("tips", []), "tip", ("joint", "offset"), ("joint", "offset"))
+    return MarkerModel(
+        skeleton=_skeleton(joints, names, index, tips),
+        markers=tuple(text(row["label"], f"marker {i}: label") for i, row in enumerate(markers, 1)),
+        joint=np.array([_index(row["joint"], f"marker {i}: joint", index) for i, row in enumerate(markers, 1)]),
+        places=_places(markers, "marker", "place"),
+        sigma=np.array([number(row["sigma"], f"marker {i}: sigma") for i, row in enumerate(markers, 1)]),
+        edge_sigma=_column(markers, "marker", "edge_sigma", math.nan),
+        freedom=_freedom(joints),
+        stiffness=_column(joints, "joint", "stiffness", 0.0),
+        centre_sigma=_column(joints, "joint", "centre_sigma", math.nan),
+        ball=_ball(whole.get("ball"), index),
+        subject=text(whole.get("subject", ""), "subject"),
+        sessions=_texts(whole.get("sessions", []), "sessions"),
+        set_name=text(whole.get("marker_set", ""), "marker_set"),
+        notes=_texts(whole.get("notes", []), "notes"),
+    )
+
+
+def _objects(value, what: str, known, needed) -> list[dict]:
+    rows = entries(value, f"{what}s")
+    if len(rows) > _MOST:
+        raise InputError(f"{what}s", f"{len(rows)}", f"at most {_MOST}")
+    for i, row in enumerate(rows, 1):
+        check_names(row, f"{what} {i}", known, needed)
+    return rows
+
+
+def _skeleton(joints, names, index, tips) -> Skeleton:
+    if not joints:
+        raise InputError("joints", "none", "a body")
+    parents = [-1 if row["parent"] is None else _index(row["parent"], f"joint {i}: parent", index)
+               for i, row in enumerate(joints, 1)]  # fmt: skip
+    return Skeleton(
+        tuple(names),
+        tuple(parents),
+        _places(joints, "joint", "offset"),
+        tuple(_index(row["joint"], f"tip {i}: joint", index) for i, row in enumerate(tips, 1)),
+        _places(tips, "tip", "offset"),
+    )
+
+
+def _freedom(joints) -> Freedom:
+    """Joints that say nothing of their freedom turn freely."""
+
+    def row(i: int, joint: dict) -> tuple:
+        order = text(joint.get("order", "XYZ"), f"joint {i}: order")
+        free = [truth(one, f"joint {i}: free") for one in _three(joint.get("free", [True] * 3), f"joint {i}: free")]
+        limits = [[usual if one is None else number(one, f"joint {i}: {name}")
+                   for one in _three(joint.get(name, [None] * 3), f"joint {i}: {name}")]
+                  for name, usual in (("low", -math.inf), ("high", math.inf))]  # fmt: skip
+        return order, free, *limits
+
+    order, free, low, high = zip(*(row(i, joint) for i, joint in enumerate(joints, 1)))
+    return Freedom(order, np.array(free), np.array(low), np.array(high))
+
+
+def _three(value, where: str) -> list:
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(where, f"{len(value)} values" if isinstance(value, list) else "no list", "three values")
+    return value
+
+
+def _column(rows, what: str, name: str, usual: float) -> np.ndarray:
+    return np.array([usual if row.get(name) is None else number(row[name], f"{what} {i}: {name}")
+                     for i, row in enumerate(rows, 1)])  # fmt: skip
+
+
+def _ball(value, index) -> BallMarker | None:
+    if value is None:
+        return None
+    names = ("label", "joint", "centre", "radius")
+    check_names(value, "ball", names, names)
+    radius = number(value["radius"], "ball: radius")
+    if not 0.0 < radius < 1.0:
+        raise InputError("ball: radius", f"{radius:g} m", "0 to 1 m")
+    joint = _index(value["joint"], "ball: joint", index)
+    return BallMarker(text(value["label"], "ball: label"), joint, _place(value["centre"], "ball: centre"), radius)
+
+
+def _index(value, where: str, index: dict[str, int]) -> int:
+    name = text(value, where)
+    if name not in index:
+        raise InputError(where, f"no joint {name[:40]!r}", "one of the joints", "check the spelling")
+    return index[name]
+
+
+def _places(rows, what: str, name: str) -> np.ndarray:
+    """(N, 3) metres."""
+    places = [_place(row[name], f"{what} {i}: {name}") for i, row in enumerate(rows, 1)]
+    return np.array(places, dtype=float).reshape(-1, 3)
+
+
+def _place(value, where: str) -> tuple[float, float, float]:
+    place = numbers(value, where, 3, _TRIPLE)
+    if max(map(abs, place)) > _FARTHEST:
+        raise InputError(where, f"{max(place, key=abs):g} m", "metres within a body", "check the unit")
+    return place
+
+
+def _texts(value, where: str) -> tuple[str, ...]:
+    return tuple(text(one, where) for one in entries(value, where))

@@ -1,0 +1,299 @@
+"""TRC files: markers as text, as Motion Analysis wrote them first and OpenSim does today.
+
+Five lines of head (kind, names and values of the rate, count and unit, labels, coordinates), then a row for each frame:
+number, time, X Y Z of every marker. There is no standard; blanks, missing cells, decimal commas, line ends and codings
+differ, and are read leniently. What a body would come out wrong by is said.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError
+from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
+from ...files.content import content
+from .raw_markers import RawMarkers, as_trial
+
+_MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}
+_EXPORT_AGAIN = "export it again"
+_MOST_FRAMES = 2_000_000
+_LARGEST = 4_000_000_000  # bytes
+
+
+def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
+             up: str | None = None) -> MarkerTrial:  # fmt: skip
+    """The trial in a TRC file. Its Y is up unless the body in it stands otherwise.
+
+    unit: metres per unit or a name; None for the file's own. subject: whose markers, where labels have prefixes.
+    up: the file's axis that points up, None to find it.
+    InputError, with the line, where the file is missing, damaged or no TRC file, and as `raw_markers.as_trial`.
+    """
+    path = Path(path)
+    lines = _lines(path)
+    head = _head(path, lines)
+    times, positions = _rows(path, lines, head)
+    fps, start, positions, told = _on_one_clock(path, head, times, positions)
+    raw = RawMarkers(labels=head.labels, positions=positions, fps=fps, unit=head.unit, usual_up=(1, 1), start=start,
+                     notes=[*head.notes, *told])  # fmt: skip
+    return as_trial(raw, path, unit, subject, up)
+
+
+def _lines(path: Path) -> list[str]:
+    """The lines of the file, ends and blanks at the end taken off."""
+    data = content(path, "a TRC file", _LARGEST)
+    if not data.strip():
+        raise InputError(path, "an empty file", "a TRC file", _EXPORT_AGAIN)
+    if b"\0" in data[:4096]:
+        raise InputError(path, "binary content", "a TRC file", "choose a TRC file")
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    return re.split(r"\r\n|\n|\r", text)
+
+
+# -- head
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What stands above the rows. columns: (M, 3) of the cells with X, Y and Z; first_row: index of the line where the
+    rows begin; values: of the head, by their names in small letters; tabs: whether they part the cells."""
+
+    labels: list[str]
+    columns: np.ndarray
+    first_row: int
+    values: dict[str, str]
+    tabs: bool
+    notes: list[str]
+
+    @property
+    def unit(self) -> str:
+        return self.values.get("units", "")
+
+    def number(self, name: str) -> float:
+        """A value of the head; NaN where it is absent or no number."""
+        try:
+            value = float(self.values.get(name, "").replace(",", "."))
+        except ValueError:
+            return math.nan
+        return value if math.isfinite(value) else math.nan
+
+
+def _head(path: Path, lines: list[str]) -> _Head:
+    at = next((i for i, line in enumerate(lines[:20]) if line.lstrip().lower().startswith("frame#")), None)
+    if at is None:
+        raise InputError(f"{path}:1", "no line that begins with Frame#", "the head of a TRC file", "choose a TRC file")
+    tabs = "\t" in lines[at]
+    below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"[XYZ]\d+$", _first(lines[i]))), None)
+    named = _cells(lines[at], tabs)
+    labels, starts = _labels(path, named, at, tabs)
+    if below is not None:
+        labels, starts, order = _by_coordinates(path, _cells(lines[below], tabs), below, labels, starts, tabs)
+    else:
+        order = (0, 1, 2)
+    if not labels:
+        raise InputError(f"{path}:{at + 1}", "no labels", "Frame#, Time and a label for each marker", _EXPORT_AGAIN)
+    notes, values = [], _values(lines, at, tabs)
+    said = values.get("nummarkers", "")
+    if said.isdigit() and int(said) != len(labels):
+        notes.append(f"{len(labels)} markers, not the {said} of the head")
+    columns = np.array(starts)[:, None] + np.array(order)
+    return _Head(labels, columns, (at if below is None else below) + 1, values, tabs, notes)
+
+
+def _first(line: str) -> str:
+    words = line.split()
+    return words[0] if words else ""
+
+
+def _cells(line: str, tabs: bool) -> list[str]:
+    return [cell.strip() for cell in line.rstrip("\n").split("\t")] if tabs else line.split()
+
+
+def _labels(path: Path, named: list[str], at: int, tabs: bool) -> tuple[list[str], list[int]]:
+    """Labels and the first column of each: every third cell where tabs part them, one after the other else."""
+    if len(named) < 3 or not named[1].lower().startswith("time"):
+        raise InputError(f"{path}:{at + 1}", f"{' '.join(named[:2])[:40]!r}", "Frame#, Time and labels", _EXPORT_AGAIN)
+    if not tabs:
+        return named[2:], [2 + 3 * i for i in range(len(named) - 2)]
+    where = [i for i in range(2, len(named)) if named[i]]
+    if where != [i for i in where if (i - 2) % 3 == 0]:
+        if where == list(range(2, 2 + len(where))):  # labels without the two empty cells between
+            return [named[i] for i in where], [2 + 3 * i for i in range(len(where))]
+        wrong = next(i for i in where if (i - 2) % 3)
+        raise InputError(f"{path}:{at + 1}", f"label {named[wrong][:40]!r} in column {wrong + 1}",
+                         "a label over every third column", _EXPORT_AGAIN)  # fmt: skip
+    last = max(where, default=-1)
+    return [named[i] for i in range(2, last + 1, 3)], list(range(2, last + 1, 3))
+
+
+def _by_coordinates(path, cells, below, labels, starts, tabs):
+    """Labels, first columns and the order of the axes, as the line X1 Y1 Z1 ... has them; markers without a label are
+    kept."""
+    names = [cell for cell in cells if cell]
+    letters = "".join(name[0].upper() for name in names[:3])
+    if sorted(letters) != ["X", "Y", "Z"] or len(names) % 3:
+        raise InputError(f"{path}:{below + 1}", f"{' '.join(names[:4])[:40]!r}", "X1 Y1 Z1 X2 ...", _EXPORT_AGAIN)
+    count = len(names) // 3
+    if count < len(labels):
+        found, expected = f"coordinates of {count} markers", f"{len(labels)}, as there are labels"
+        raise InputError(f"{path}:{below + 1}", found, expected, _EXPORT_AGAIN)
+    order = tuple(letters.index(axis) for axis in "XYZ")
+    return labels + [""] * (count - len(labels)), [2 + 3 * i for i in range(count)], order
+
+
+def _values(lines: list[str], at: int, tabs: bool) -> dict[str, str]:
+    """The values of the head by their names: a line of names over a line of values."""
+    for i in range(at - 1):
+        names = lines[i].split()
+        if names and names[0].lower() == "datarate":
+            values = _cells(lines[i + 1], tabs) if "\t" in lines[i + 1] else lines[i + 1].split()
+            return {name.lower(): value for name, value in zip(names, values)}
+    return {}
+
+
+# -- rows
+
+
+def _rows(path: Path, lines: list[str], head: _Head) -> tuple[list[str], np.ndarray]:
+    """(T texts of Time, (T, M, 3) places, NaN where a cell is empty)."""
+    width = int(head.columns.max()) + 1
+    times, rows = [], []
+    for i in range(head.first_row, len(lines)):
+        if not lines[i] or lines[i].isspace():
+            continue
+        cells = _row(path, i, lines[i], head, width)
+        times.append(cells[1].strip())
+        rows.append(_numbers(path, i, cells[2:]))
+    if not rows:
+        raise InputError(path, "no rows below the head", "a row for each frame", _EXPORT_AGAIN)
+    return times, np.array(rows)[:, head.columns - 2]
+
+
+def _row(path: Path, index: int, line: str, head: _Head, width: int) -> list[str]:
+    """The cells of a row, filled up where empty ones at its end are left out. InputError where there are more than
+    markers, or a place is cut in two."""
+    cells = line.split("\t") if head.tabs else line.split()
+    while len(cells) > width and not cells[-1].strip():
+        cells.pop()
+    place = f"{path}:{index + 1}"
+    if len(cells) > width:
+        found = f"{len(cells) - 2} coordinates"
+        raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers", "one recording a file")
+    while head.tabs and cells and not cells[-1].strip():
+        cells.pop()
+    short = width - len(cells)
+    if short and (not head.tabs or len(cells) < 2 or (len(cells) - 2) % 3):
+        found = f"{max(len(cells) - 2, 0)} coordinates"
+        raise InputError(place, found, f"{width - 2} for {len(head.labels)} markers",
+                         f"the row is cut off; {_EXPORT_AGAIN}")  # fmt: skip
+    return cells + [""] * short
+
+
+def _numbers(path: Path, index: int, cells: list[str]) -> np.ndarray:
+    """(3 M,) float of one row's cells, NaN where there is nothing."""
+    try:
+        return np.array(list(map(float, cells)))
+    except ValueError:
+        return np.array([_number(path, cell.strip(), index + 1, column) for column, cell in enumerate(cells, 3)])
+
+
+def _number(path: Path, cell: str, line: int, column: int) -> float:
+    if cell.lower() in _MISSING:
+        return math.nan
+    try:
+        value = float(cell if "." in cell else cell.replace(",", "."))
+    except ValueError:
+        raise InputError(f"{path}:{line}", f"{cell[:40]!r} in column {column}", "a number", "mend it") from None
+    return value
+
+
+# -- time
+
+
+def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarray):
+    """(frames per second, seconds of the first frame, places, notes): frames that the times leave out are put in, not
+    seen. InputError where times go back or are not those of one rate."""
+    rates = (head.number(name) for name in ("datarate", "camerarate", "origdatarate"))
+    said = next((rate for rate in rates if rate > 0), math.nan)
+    seconds, coarse = _seconds(times)
+    if len(times) < 2 or not np.isfinite(seconds).all() or np.ptp(seconds) == 0:
+        _check_rate(path, said)
+        told = [] if len(times) < 2 else ["no times in the file: frames follow one another at DataRate"]
+        return said, 0.0 if not np.isfinite(seconds[:1]).all() else float(seconds[0]), positions, told
+    steps = np.diff(seconds)
+    if (steps <= 0).any() and not _only_coarse(steps, coarse, said):
+        frame = int(np.argmax(steps <= 0)) + 2
+        found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
+        raise InputError(path, found, "times that grow", "one recording a file")
+    fps, told = _rate(said, seconds, steps, coarse)
+    _check_rate(path, fps)
+    frames = np.rint((seconds - seconds[0]) * fps).astype(int)
+    plain = np.arange(len(frames))
+    if np.abs((seconds - seconds[0]) * fps - plain).max() <= max(0.5, coarse * fps + 0.1):
+        frames = plain
+    off = np.abs((seconds - seconds[0]) - frames / fps).max()
+    if len(np.unique(frames)) < len(frames) or off > max(0.25 / fps, coarse):
+        found = f"times that lie up to {1000 * off:.3g} ms beside {fps:g} frames per second"
+        raise InputError(path, found, "one rate", "resample it to one rate")
+    return fps, float(seconds[0]), *_with_gaps(path, frames, positions, told)
+
+
+def _seconds(times: list[str]) -> tuple[np.ndarray, float]:
+    """(T,) seconds, NaN where there is none, and how coarsely they are written."""
+    texts = [time.replace(",", ".") for time in times]
+
+    def value(text: str) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            return math.nan
+
+    digits = max((len(text.partition(".")[2]) for text in texts[:100] if "e" not in text.lower()), default=6)
+    seconds = np.array([value(text) for text in texts])
+    return np.where(np.abs(seconds) < 1e7, seconds, np.nan), 10.0 ** -digits
+
+
+def _only_coarse(steps: np.ndarray, coarse: float, said: float) -> bool:
+    """Whether equal times follow from few digits."""
+    return bool((steps >= 0).all()) and said > 0 and 1 / said < coarse
+
+
+def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) -> tuple[float, list[str]]:
+    """Frames per second: as the head says where the times agree, else as the times do, which is told."""
+    if said > 0:
+        frames = np.rint((seconds - seconds[0]) * said)
+        exact = np.abs(seconds - seconds[0] - frames / said).max() <= coarse + 0.1 / said
+        if exact and np.median(steps * said) < 1.5:
+            return said, []
+    own = 1 / float(np.median(steps))
+    mean = (len(seconds) - 1) / float(seconds[-1] - seconds[0])
+    own = mean if abs(mean / own - 1) < 0.05 else own
+    own = round(own) if abs(own - round(own)) < 0.005 * own and round(own) else own
+    return own, [f"{own:g} frames per second by the times; the head says {said:g}"] if said > 0 else []
+
+
+def _check_rate(path: Path, fps: float) -> None:
+    if not FEWEST_FPS <= fps <= MOST_FPS:
+        expected = f"{FEWEST_FPS:g} to {MOST_FPS:g}"
+        raise InputError(path, f"{fps:g} frames per second", expected, "check DataRate and Time")
+
+
+def _with_gaps(path: Path, frames: np.ndarray, positions: np.ndarray, told: list[str]):
+    """Places with a frame for each number, and the notes."""
+    count = int(frames[-1]) + 1
+    missing = count - len(frames)
+    if not missing:
+        return positions, told
+    if count > min(20 * len(frames) + 1000, _MOST_FRAMES):
+        raise InputError(path, f"times that leave out {missing} frames of {count}", "one recording", "cut it in two")
+    whole = np.full((count, *positions.shape[1:]), np.nan)
+    whole[frames] = positions
+    return whole, [*told, f"{missing} frames that the times leave out, not seen"]

@@ -1,0 +1,346 @@
+"""A subject's model from recordings: built on the static trial or on upright frames of the motion, then refined by the
+motion (Fredriksson §5.2.2).
+
+Landmarks predict all joint centres (`centres`). The motion then refines them by adjusting the model and its poses in
+many frames together (`adjustment`). This takes the place of sphere fits joint by joint (the [14] and [19] of
+Fredriksson §3.2.4): it too finds the point that stands still in both segments, but for all joints at once, with the
+bones between them as long in every frame, and it says how sure each centre is. So hips, knees, ankles, shoulders,
+elbows and marked wrists are functional as far as the motion turns them, and stay predicted where it does not; spine,
+neck and toes are predicted, with little play. Axes of knees and elbows come out of it as well: they are where these
+joints bend like hinges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.errors import Cancelled, InputError
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from ...motion.motion import Motion, forward_kinematics
+from .adjustment import Adjustment, Body, Prior, Pull
+from .assemble import SIGMA, model_from_frame
+from ..pose.chain import chain
+from ..frames import rigid_fit
+from .joint_freedom import freedom_of
+from .marker_set import MarkerSet
+from .model import MarkerModel
+from ..pose.pose import PoseSettings, Solved, solve
+from ..pose.residuals import seen_markers
+from .static import static_frame
+from ..trial import MarkerTrial
+from ..pose.weights import cluster_deviation, edge_deviation
+
+FRAMES = 60
+_STATIC_FRAMES = 4
+_NEUTRAL_FRAMES = 5
+_WORTH = 10.0  # independent frames that the chosen ones are worth: skin errs alike in poses alike
+_PLACE_SIGMA = 0.008
+_USUAL_SIGMA = 0.006
+_UNTOLD = 0.001  # m: what no motion can tell stays as predicted
+_FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
+_LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
+"""Bones that lie exactly along an axis: joint at their end -> axis."""
+
+
+# Which frames of a motion a model is made from: upright ones, and ones as unlike as can be.
+
+
+_CANDIDATES = 400
+
+
+# Markers that the static trial, or the frames that a model began with, did not show: placed where the motion has
+# them.
+
+
+_FRAMES = 40
+_FEWEST = 3  # frames in which a marker has to be seen
+
+
+def with_late_markers(
+    model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial, cancelled: Callable[[], bool] | None = None
+) -> MarkerModel:
+    """The model with the set's markers that it lacks and the trial shows, and joints freed that they now tell.
+
+    Each lies at the median of where it is seen in its segment's frame, over some frames solved without it.
+    """
+    seen = dict(zip(trial.labels, trial.seen.sum(axis=0)))
+    late = [label for label in marker_set.labels
+            if label not in model.markers and seen.get(label, 0) >= _FEWEST
+            and marker_set.segment_of(label) in model.skeleton.names]
+    if not late:
+        return model
+    shown = trial.seen[:, [trial.index(label) for label in late]].sum(axis=1)
+    frames = np.sort(np.argsort(-shown, kind="stable")[: 4 * _FRAMES])
+    frames = frames[np.unique(np.linspace(0, len(frames) - 1, _FRAMES).astype(int))]
+    part = MarkerTrial(trial.labels, trial.positions[frames], 1.0, name=trial.name)
+    motion = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled).motion
+    joints, turns = forward_kinematics(motion)
+    places, carriers, found = [], [], []
+    for label in late:
+        joint = model.skeleton.index(marker_set.segment_of(label))
+        away = part.positions[:, part.index(label)] - joints[:, joint]
+        local = quaternion.rotate(quaternion.inverse(turns[:, joint]), away)
+        local = local[np.isfinite(local).all(axis=-1)]
+        if len(local):
+            found.append(label)
+            carriers.append(joint)
+            places.append(np.median(local, axis=0))
+    return _added(model, found, carriers, places) if found else model
+
+
+def _added(model: MarkerModel, labels: list[str], joints: list[int], places: list[np.ndarray]) -> MarkerModel:
+    joint = np.concatenate([model.joint, joints])
+    counts = {name: int(np.sum(joint == index)) for index, name in enumerate(model.skeleton.names)}
+    freedom, stiffness = freedom_of(model.skeleton.names, model.skeleton.parents, counts)
+    return replace(
+        model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
+        sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
+        edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]),
+        freedom=freedom, stiffness=stiffness,
+        notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"),
+    )
+
+
+def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], count: int) -> list[int]:
+    """Up to `count` frames in which the body stands most like one in a static trial, best first.
+
+    landmarks: name -> indices of its markers. Straight knees, an upright trunk and low feet count; frames lie a fifth
+    of a second apart, and frames in which a landmark is hidden come only where there are no others.
+    """
+    at = {name: trial.positions[:, list(group)].mean(axis=1) for name, group in landmarks.items()}
+    cost = np.zeros(len(trial))
+    for place in at.values():
+        cost += np.where(np.isfinite(place).all(axis=-1), 0.0, 3.0)
+    for side in ("left", "right"):
+        names = [f"{side}_asis", f"{side}_knee_lateral", f"{side}_ankle_lateral"]
+        if all(name in at for name in names):
+            hip, knee, ankle = (at[name] for name in names)
+            cost += np.nan_to_num(1.0 - _cosine(hip - knee, knee - ankle), nan=1.0) * 2.0
+            cost += np.nan_to_num(np.maximum(_tilt(knee - ankle) - 0.1, 0.0), nan=0.5)
+    if "c7" in at and "left_asis" in at and "right_asis" in at:
+        cost += np.nan_to_num(_tilt(at["c7"] - 0.5 * (at["left_asis"] + at["right_asis"])), nan=0.5)
+    chosen: list[int] = []
+    apart = max(1, int(round(0.2 * trial.fps)))
+    for frame in np.argsort(cost, kind="stable"):
+        if len(chosen) == count or (chosen and cost[frame] > cost[chosen[0]] + 1.0):
+            break
+        if all(abs(int(frame) - other) >= apart for other in chosen):
+            chosen.append(int(frame))
+    return chosen
+
+
+def _cosine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
+    return np.sum(a * b, axis=-1) / np.maximum(length, 1e-9)
+
+
+def _tilt(v: np.ndarray) -> np.ndarray:
+    """Angle in radians between vectors (T, 3) and the vertical."""
+    return arctan2(np.linalg.norm(v[:, :2], axis=-1), v[:, 2])
+
+
+def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarray:
+    """`count` frames whose poses differ most, ascending: each next one is farthest from those chosen.
+
+    root: indices of the pelvis' markers, in whose frame poses are compared. Frames that show less than two thirds of
+    what others show are passed over.
+    """
+    frames = np.unique(np.linspace(0, len(trial) - 1, min(len(trial), _CANDIDATES)).astype(int))
+    shown = trial.seen[frames].sum(axis=1)
+    frames = frames[shown >= 0.67 * shown.max()]
+    if len(frames) <= count:
+        return frames
+    positions = trial.positions[frames]
+    own = positions[:, root] if len(root) else positions
+    reference = own[int(np.argmax(np.isfinite(own).all(axis=-1).sum(axis=1)))]
+    fit = rigid_fit(reference, own)
+    pose = np.einsum("fba,fmb->fma", fit.rotation, positions - fit.shift[:, None])
+    known = np.isfinite(pose)
+    middle = np.where(known, pose, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
+    pose = np.where(known, pose, middle).reshape(len(frames), -1)
+    if not pose.any():  # the pelvis is never seen: nothing tells poses apart
+        return frames[np.unique(np.linspace(0, len(frames) - 1, count).astype(int))]
+    chosen = [int(np.argmin(np.linalg.norm(pose - pose.mean(axis=0), axis=1)))]
+    nearest = np.full(len(frames), np.inf)
+    while len(chosen) < count:
+        nearest = np.minimum(nearest, np.linalg.norm(pose - pose[chosen[-1]], axis=1))
+        chosen.append(int(np.argmax(nearest)))
+    return np.sort(frames[chosen])
+
+
+def calibrate(
+    marker_set: MarkerSet,
+    trial: MarkerTrial,
+    static: MarkerTrial | None = None,
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> MarkerModel:
+    """The model of the body in `trial`.
+
+    trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
+    markers, or None: the model then begins with upright frames of the motion. InputError where too few landmarks are
+    seen, Cancelled when the user stops.
+    """
+    tell = progress or (lambda part, text: None)
+    stopped = cancelled or (lambda: False)
+    tell(0.0, "joint centres")
+    model = from_static(marker_set, static) if static is not None else from_motion(marker_set, trial)
+    model = replace(model, subject=trial.subject, sessions=(trial.name,))
+    if stopped():
+        raise Cancelled("calibration cancelled")
+    tell(0.2, "refining the model")
+    model = with_late_markers(model, marker_set, trial, stopped)
+    model = replace(model, notes=(*model.notes, *_left_out(model, marker_set, trial)))
+    return refined(model, trial, static, stopped)
+
+
+def _left_out(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial) -> list[str]:
+    """Lines on the set's markers that are not on the model, and why."""
+    absent = sorted(set(marker_set.labels) - set(model.markers) - marker_set.optional - marker_set.static)
+    shown = {label for label, seen in zip(trial.labels, trial.seen.any(axis=0)) if seen}
+    nowhere = [label for label in absent if label not in shown]
+    loose = [label for label in absent if label in shown]
+    lines = [f"seen nowhere, so not on the model: {', '.join(nowhere)}"] if nowhere else []
+    if loose:
+        lines.append(f"not on the model, since too little tells how their segments lie: {', '.join(loose)}")
+    return lines
+
+
+def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
+    """The model that a static trial gives where it is stillest, averaged over its segments."""
+    frame = static_frame(static, marker_set.clusters(static.labels))
+    return model_from_frame(frame, marker_set, standing=True, subject=static.subject)
+
+
+def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
+    """The mean of the models that some upright frames of a motion give."""
+    index = {label: i for i, label in enumerate(trial.labels)}
+    landmarks = {
+        name: tuple(index[label] for label in labels)
+        for name, labels in marker_set.landmarks.items() if all(label in index for label in labels)
+    }
+    found, reason = [], None
+    for frame in neutral_frames(trial, landmarks, _NEUTRAL_FRAMES):
+        places = dict(zip(trial.labels, trial.positions[frame]))
+        try:
+            found.append(model_from_frame(places, marker_set, standing=False, subject=trial.subject))
+        except InputError as error:
+            reason = error
+    if not found:
+        raise reason or InputError(trial.name, "no frames")
+    most = max(found, key=lambda model: (len(model.skeleton), len(model.markers)))
+    alike = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
+    skeleton = replace(
+        most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
+        end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0),
+    )
+    note = f"no static trial: begun with {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
+    places = np.mean([m.places for m in alike], axis=0)
+    return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
+
+
+def refined(
+    model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
+    cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
+    place_sigma: float = _PLACE_SIGMA,
+) -> MarkerModel:
+    """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
+    part = _chosen(model, trial, static, frames)
+    solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
+    motion, part = _sane(solved, part)
+    body = _body(model)
+    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen_markers(model, part), _sigmas(model), worth)
+    task.start(motion)
+    for _ in range(2):
+        if cancelled():
+            raise Cancelled("calibration cancelled")
+        task.run()
+        task.sigma = _scatter(task.residuals())
+    skeleton = replace(model.skeleton, offsets=body.offsets)
+    deviation = edge_deviation(model.joint, body.places, seen_markers(model, part))
+    return replace(
+        model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
+        edge_sigma=cluster_deviation(model.joint, deviation),
+    )
+
+
+def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, count: int) -> MarkerTrial:
+    """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
+
+    They are no neighbours in time, which the rate of one frame a second tells whoever solves them.
+    """
+    root = [i for i, label in enumerate(trial.labels) if label in model.markers
+            and model.joint[model.markers.index(label)] == 0]
+    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
+    if static is not None:
+        still = seen_markers(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
+        positions = np.concatenate([still, positions])
+    return MarkerTrial(model.markers, positions, 1.0, name=trial.name)
+
+
+def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
+    """Without the frames that fit far worse than most: swapped markers, or a pose that was not found."""
+    known = np.isfinite(solved.residual)
+    square = np.where(known, solved.residual, 0.0) ** 2
+    away = np.sqrt(square.sum(axis=1) / np.maximum(known.sum(axis=1), 1))
+    away[~known.any(axis=1)] = np.inf
+    good = np.flatnonzero(away <= _FAR * np.median(away[np.isfinite(away)]) + _FAR_BESIDE)
+    motion = solved.motion
+    kept = Motion(motion.skeleton, motion.root_positions[good], motion.rotations[good], motion.fps)
+    return kept, part.with_positions(part.positions[good])
+
+
+def _part(name: str) -> str:
+    return name.removeprefix("Left").removeprefix("Right")
+
+
+def _body(model: MarkerModel) -> Body:
+    names = model.skeleton.names
+    limb = np.array([_LIMBS.get(_part(name), -1) for name in names])
+    held = ~model.freedom.free.any(axis=1)
+    return Body(
+        names, model.skeleton.parents, model.skeleton.offsets.copy(), model.joint, model.places.copy(), held, limb
+    )
+
+
+def _prior(model: MarkerModel, place_sigma: float) -> Prior:
+    sigma = np.maximum(model.centre_sigma, 0.003)
+    above = sigma[np.maximum(model.skeleton.parents, 0)]
+    places = np.full(len(model.joint), place_sigma)
+    held = ~model.freedom.free.any(axis=1)
+    offsets = np.where(held, _UNTOLD, np.sqrt(sigma**2 + above**2))
+    return Prior(model.skeleton.offsets.copy(), offsets, model.places.copy(), places)
+
+
+def _pull(model: MarkerModel) -> Pull:
+    """Play about the rest pose: of joints that are drawn to it, and of angles that are not free."""
+    play = {}
+    for joint in range(1, len(model.skeleton)):
+        free = model.freedom.free[joint]
+        if not free.any():
+            continue
+        row = np.full(3, _USUAL_SIGMA / model.stiffness[joint] if model.stiffness[joint] > 0.0 else np.inf)
+        for angle, letter in enumerate(model.freedom.order[joint]):
+            if not free[angle]:
+                row["XYZ".index(letter)] = np.radians(1.0)
+        if np.isfinite(row).any():
+            play[joint] = row
+    freedom = model.freedom
+    runs = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free).runs
+    return Pull(play, runs)
+
+
+def _sigmas(model: MarkerModel) -> np.ndarray:
+    return np.maximum(model.sigma, 0.004)
+
+
+def _scatter(residuals: np.ndarray) -> np.ndarray:
+    """How far markers stray (M,) m, from residuals (F, M, 3), half by what skin usually does."""
+    known = np.isfinite(residuals).all(axis=-1)
+    square = np.where(known, np.sum(np.nan_to_num(residuals) ** 2, axis=-1), 0.0).sum(axis=0)
+    mean = square / np.maximum(known.sum(axis=0), 1) / 3.0
+    return np.sqrt(0.5 * _USUAL_SIGMA**2 + 0.5 * np.where(known.any(axis=0), mean, _USUAL_SIGMA**2))

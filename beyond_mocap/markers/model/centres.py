@@ -1,0 +1,393 @@
+"""Joint centres and segment axes predicted from landmarks of one frame.
+
+Hips after Harrington et al. 2007 ("Prediction of the hip joint centre in adults, children, and patients with cerebral
+palsy based on magnetic resonance imaging", J Biomech 40:595): regressions on the width and depth of the pelvis. Knees,
+ankles and elbows lie midway between their epicondyles and malleoli (Wu et al. 2002, 2005), or half a width away from
+the lateral one, square to the limb (Davis et al. 1991). Shoulders lie 15 % of the distance between the acromia below
+them (17 % in Rab et al. 2002, from markers' middles to heads of the humerus that lie lower with hanging arms). Pelvis,
+thorax and head are turned as the typical body's landmarks (`template`) fit them best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from ...base.vectors import unit_vector
+from ...base.errors import InputError
+from ...motion import quaternion
+from ..frames import mean_rotation, rigid_fit
+from .template import LANDMARK_PLACES, PLACES, TIPS
+
+MARKER_RADIUS = 0.007  # m
+HALF_WIDTHS = {"knee": 0.052, "ankle": 0.036, "elbow": 0.036}
+"""Half the breadth of a joint in metres, of an adult of 1.80 m; a marker's radius comes on top."""
+SIGMAS = {"both": 0.006, "one side": 0.012, "hip": 0.007, "shoulder": 0.015, "alone": 0.02, "trunk": 0.02}
+"""How uncertain a predicted centre is, metres: the errors that the sources give, rounded."""
+_unit = partial(unit_vector, least=1e-12)  # metres: shorter ones have no direction
+_STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its plane says nothing
+_UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
+
+
+@dataclass
+class Centres:
+    """What one frame tells about a body.
+
+    places: joint -> centre (3,) m. axes: joint -> (3, 3), columns are the joint's X, Y, Z in the world. sigma: joint ->
+    m, how uncertain the centre is. tips: joint -> place (3,) m of its tip. size: how large against the typical body.
+    notes: lines for people.
+    """
+
+    size: float
+    places: dict[str, np.ndarray] = field(default_factory=dict)
+    axes: dict[str, np.ndarray] = field(default_factory=dict)
+    sigma: dict[str, float] = field(default_factory=dict)
+    tips: dict[str, np.ndarray] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+    def put(self, joint: str, place: np.ndarray, axes: np.ndarray, sigma: float) -> None:
+        """Note a joint's centre, axes and uncertainty."""
+        self.places[joint], self.axes[joint], self.sigma[joint] = place, axes, sigma
+
+
+def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
+    """Centres and axes of all joints that the landmarks reach.
+
+    points: landmark -> (3,) m, Z up. standing: whether this is a static trial, so that an upright trunk's axes are the
+    vertical and soles lie flat; otherwise they are what the typical body's are. InputError where pelvis or a whole leg
+    cannot be told.
+    """
+    points = {name: np.asarray(place, dtype=float) for name, place in points.items() if np.isfinite(place).all()}
+    out = Centres(body_size(points))
+    _pelvis(out, points)
+    if any(LANDMARK_PLACES[name][0] == "Chest" for name in points):
+        _thorax(out, points)
+        _head(out, points)
+    if standing:
+        _upright(out)
+    _spine(out)
+    for side in ("left", "right"):
+        _leg(out, points, side, standing)
+        if "Chest" in out.axes and f"{side}_acromion" in points:
+            _arm(out, points, side)
+    return out
+
+
+def body_size(points: Mapping[str, np.ndarray]) -> float:
+    """How large a body is against the typical one: the middle of its distances within segments and along limbs."""
+    pairs = [
+        (f"{side}_{a}", f"{side}_{b}")
+        for side in ("left", "right")
+        for a, b in (("knee_lateral", "ankle_lateral"), ("acromion", "elbow_lateral"), ("elbow_lateral", "wrist_ulnar"))
+    ] + [("c7", "t10"), ("left_asis", "right_asis"), ("c7", "jugular_notch")]
+    ratios = [
+        np.linalg.norm(points[a] - points[b]) / np.linalg.norm(LANDMARK_PLACES[a][1] - LANDMARK_PLACES[b][1])
+        for a, b in pairs if a in points and b in points
+    ]
+    return float(np.clip(np.median(ratios), 0.4, 1.6)) if ratios else 1.0
+
+
+def _fit(joint: str, points: Mapping[str, np.ndarray], size: float, beside: tuple[str, ...] = ()):
+    """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell.
+
+    beside: landmarks of other segments that are taken in where there are too few of its own.
+    """
+    names = [name for name, (carrier, _) in LANDMARK_PLACES.items() if carrier == joint and name in points]
+    firm = [name for name in names if not name.endswith("scapula")]
+    names = firm if len(firm) >= 3 else names
+    if len(names) < 3:
+        names += [name for name in beside if name in points]
+    if len(names) < 3:
+        return None
+    typical = size * np.array([LANDMARK_PLACES[name][1] for name in names])
+    fit = rigid_fit(typical, np.array([points[name] for name in names]))
+    return (fit.rotation, fit.shift) if fit.sound else None
+
+
+def _on(fit, place: np.ndarray, size: float) -> np.ndarray:
+    rotation, shift = fit
+    return rotation @ (size * np.asarray(place)) + shift
+
+
+def frame_along(axis: str, along: np.ndarray, second: str, towards: np.ndarray) -> np.ndarray:
+    """The right-handed axes (3, 3) whose `axis` is exactly `along` and whose `second` lies nearest to `towards`."""
+    columns = {axis: _unit(along)}
+    columns[second] = _unit(towards - (towards @ columns[axis]) * columns[axis])
+    third = next(letter for letter in "XYZ" if letter not in columns)
+    turns = {"X": ("Y", "Z"), "Y": ("Z", "X"), "Z": ("X", "Y")}[third]
+    columns[third] = np.cross(columns[turns[0]], columns[turns[1]])
+    return np.stack([columns[letter] for letter in "XYZ"], axis=-1)
+
+
+def _pelvis(out: Centres, points: Mapping[str, np.ndarray]) -> None:
+    """Pelvis and hips; the root lies midway between the hips."""
+    fit = _fit("Hips", points, out.size)
+    if fit is None:
+        raise InputError("pelvis", "fewer than three landmarks", "both iliac spines and the sacrum",
+                         "name the pelvis' markers in the marker set")
+    hips = _harrington(points)
+    if hips is None:
+        hips = {side: _on(fit, PLACES[f"{side}UpLeg"], out.size) for side in ("Left", "Right")}
+        out.notes.append("hips placed as a typical pelvis has them: an iliac spine or the sacrum is not marked")
+    out.put("Hips", 0.5 * (hips["Left"] + hips["Right"]), fit[0], SIGMAS["hip"])
+    for side, place in hips.items():
+        out.places[f"{side}UpLeg"], out.sigma[f"{side}UpLeg"] = place, SIGMAS["hip"]
+
+
+def _harrington(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray] | None:
+    """Hip centres from both anterior spines and the posterior ones (or the sacrum); None where one is missing."""
+    back = [points[name] for name in ("left_psis", "right_psis") if name in points]
+    back = np.mean(back, axis=0) if len(back) == 2 else points.get("sacrum")
+    if back is None or "left_asis" not in points or "right_asis" not in points:
+        return None
+    front = 0.5 * (points["left_asis"] + points["right_asis"])
+    across = points["left_asis"] - points["right_asis"]
+    axes = frame_along("Y", across, "X", front - back)
+    # skin markers stand a radius away from the bone
+    front, depth = front - MARKER_RADIUS * axes[:, 0], np.linalg.norm(front - back) - 2.0 * MARKER_RADIUS
+    width = np.linalg.norm(across)
+    ahead, up, side = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
+    return {
+        name: front + axes @ np.array([ahead, sign * side, up]) for name, sign in (("Left", 1.0), ("Right", -1.0))
+    }
+
+
+def _thorax(out: Centres, points: Mapping[str, np.ndarray]) -> None:
+    fit = _fit("Chest", points, out.size, ("left_acromion", "right_acromion"))
+    if fit is None:
+        raise InputError("thorax", "fewer than three landmarks, or all on one line",
+                         "for instance c7, jugular_notch and t10", "name the thorax' markers in the marker set")
+    out.put("Chest", _on(fit, PLACES["Chest"], out.size), fit[0], SIGMAS["trunk"])
+    neck = _on(fit, PLACES["Neck"], out.size)
+    if "c7" in points:  # anchored where it is marked
+        neck = points["c7"] + fit[0] @ (out.size * (PLACES["Neck"] - LANDMARK_PLACES["c7"][1]))
+    out.put("Neck", neck, fit[0], SIGMAS["trunk"])
+    for side in ("Left", "Right"):
+        place = _on(fit, PLACES[f"{side}Shoulder"], out.size)
+        if "jugular_notch" in points:
+            away = PLACES[f"{side}Shoulder"] - LANDMARK_PLACES["jugular_notch"][1]
+            place = points["jugular_notch"] + fit[0] @ (out.size * away)
+        out.places[f"{side}Shoulder"], out.sigma[f"{side}Shoulder"] = place, SIGMAS["one side"]
+
+
+def _head(out: Centres, points: Mapping[str, np.ndarray]) -> None:
+    fit = _fit("Head", points, out.size)
+    if fit is None:  # a head that no marker shows stands on the neck as a typical one does
+        fit = (out.axes["Chest"], out.places["Neck"] - out.axes["Chest"] @ (out.size * PLACES["Neck"]))
+        out.notes.append("head not marked: held straight on the neck")
+    out.put("Head", _on(fit, PLACES["Head"], out.size), fit[0], SIGMAS["trunk"])
+    out.tips["Head"] = _on(fit, TIPS["Head"], out.size)
+
+
+def _upright(out: Centres) -> None:
+    """In a static trial the trunk's axes are level, so that standing straight is the rest pose."""
+    for joint in ("Hips", "Chest", "Head"):
+        if joint in out.axes and out.axes[joint][2, 2] > np.cos(_UPRIGHT):
+            out.axes[joint] = frame_along("Z", np.array([0.0, 0.0, 1.0]), "Y", out.axes[joint][:, 1])
+
+
+def _spine(out: Centres) -> None:
+    """The lumbar joints between pelvis and thorax, the upper neck between neck and head."""
+    if "Chest" not in out.axes:
+        return
+    pelvis, chest = out.axes["Hips"], out.axes["Chest"]
+    out.put("Spine", out.places["Hips"] + pelvis @ (out.size * PLACES["Spine"]), pelvis, SIGMAS["trunk"])
+    low, high = PLACES["Spine"], PLACES["Chest"]
+    middle = mean_rotation(np.stack([pelvis, chest]))
+    share = (PLACES["Spine1"][2] - low[2]) / (high[2] - low[2])
+    bow = out.size * (PLACES["Spine1"] - (1.0 - share) * low - share * high)
+    place = (1.0 - share) * out.places["Spine"] + share * out.places["Chest"] + middle @ bow
+    out.put("Spine1", place, middle, SIGMAS["trunk"])
+    out.axes["Neck"] = chest
+    middle = mean_rotation(np.stack([chest, out.axes["Head"]]))
+    out.put("Neck1", 0.5 * (out.places["Neck"] + out.places["Head"]), middle, SIGMAS["trunk"])
+
+
+def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """A knee's, ankle's or elbow's centre, the unit direction from its middle to the outside, and the uncertainty.
+
+    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only one side is marked.
+    """
+    lateral, medial = points.get(f"{side}_{joint}_lateral"), points.get(f"{side}_{joint}_medial")
+    if lateral is None and medial is None:
+        return None
+    if lateral is not None and medial is not None:
+        return 0.5 * (lateral + medial), _unit(lateral - medial), SIGMAS["both"]
+    marker, inwards = (lateral, -1.0) if medial is None else (medial, 1.0)
+    half = out.size * HALF_WIDTHS[joint] + MARKER_RADIUS
+    length = max(float(np.linalg.norm(above - marker)), 1e-6)
+    up = (above - marker) / length
+    outwards = _unit(hint - (hint @ up) * up)
+    sine = min(half / length, 0.9)  # so that the centre lies square below the joint above
+    return marker + half * (sine * up + inwards * np.sqrt(1.0 - sine**2) * outwards), outwards, SIGMAS["one side"]
+
+
+def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bool) -> None:
+    name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
+    hip = out.places[f"{name}UpLeg"]
+    knee = _hinge(out, points, side, "knee", hip, _knee_outwards(out, points, side, sign, standing))
+    if knee is None:
+        raise InputError(f"{side} leg", "no marker on the knee", f"{side}_knee_lateral",
+                         "name the leg's markers in the marker set")
+    ankle = _hinge(out, points, side, "ankle", knee[0], knee[1])
+    if ankle is None:
+        raise InputError(f"{side} leg", "no marker on the ankle", f"{side}_ankle_lateral",
+                         "name the leg's markers in the marker set")
+    across = sign * knee[1]
+    out.axes[f"{name}UpLeg"] = frame_along("Z", hip - knee[0], "Y", across)
+    out.put(f"{name}Leg", knee[0], frame_along("Z", knee[0] - ankle[0], "Y", across), knee[2])
+    _foot(out, points, side, ankle, standing)
+
+
+def _knee_outwards(out, points, side, sign, standing) -> np.ndarray:
+    """Where the outside of a knee points when only that side is marked: by the thigh's marker, as Plug-in Gait has it;
+    standing, more by the pelvis, since wands are seldom placed that well."""
+    pelvis = sign * out.axes["Hips"][:, 1]
+    wand, lateral = points.get(f"{side}_thigh"), points.get(f"{side}_knee_lateral")
+    if wand is None or lateral is None:
+        return pelvis
+    up = _unit(out.places[f"{side.capitalize()}UpLeg"] - lateral)
+    away = (wand - lateral) - ((wand - lateral) @ up) * up
+    return _unit(away) + (2.0 * _unit(pelvis - (pelvis @ up) * up) if standing else 0.0)
+
+
+def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, standing: bool) -> None:
+    name = side.capitalize()
+    marked = [x for x in ("heel", "toe", "metatarsal_1", "metatarsal_5", "toe_tip") if f"{side}_{x}" in points]
+    front = [points[f"{side}_{x}"] for x in marked if x.startswith(("toe", "meta")) and x != "toe_tip"]
+    front_names = [f"{side}_{x}" for x in marked if x.startswith(("toe", "meta")) and x != "toe_tip"]
+    shank = out.axes[f"{name}Leg"]
+    if not front:
+        axes = shank
+        out.notes.append(f"{side} foot: no marker at the toes; held square to the shank")
+    else:
+        middle = np.mean(front, axis=0)
+        behind = points.get(f"{side}_heel", ankle[0])
+        axes = _foot_axes(out, points, side, ankle[0], middle - behind, standing)
+    out.put(f"{name}Foot", ankle[0], axes, ankle[2])
+    away = PLACES[f"{name}ToeBase"] - PLACES[f"{name}Foot"]
+    toe = ankle[0] + axes @ (out.size * away)
+    if front:
+        typical = np.mean([LANDMARK_PLACES[x][1] for x in front_names], axis=0)
+        toe = np.mean(front, axis=0) + axes @ (out.size * (PLACES[f"{name}ToeBase"] - typical))
+    out.put(f"{name}ToeBase", toe, axes, SIGMAS["one side"])
+    out.tips[f"{name}ToeBase"] = toe + axes @ (out.size * (TIPS[f"{name}ToeBase"] - PLACES[f"{name}ToeBase"]))
+
+
+def _foot_axes(out, points, side, ankle, forward, standing) -> np.ndarray:
+    """A foot's axes: level where it stands; else as heel, toes and ankle lie on a typical foot."""
+    name = side.capitalize()
+    if standing and abs(forward[2]) < 0.35 * np.linalg.norm(forward):
+        return frame_along("Z", np.array([0.0, 0.0, 1.0]), "X", forward)
+    names = [x for x, (carrier, _) in LANDMARK_PLACES.items() if carrier == f"{name}Foot" and x in points]
+    typical = out.size * np.array([PLACES[f"{name}Foot"], *(LANDMARK_PLACES[x][1] for x in names)])
+    fit = rigid_fit(typical, np.array([ankle, *(points[x] for x in names)]))
+    return fit.rotation if fit.sound else frame_along("X", forward, "Z", out.axes[f"{name}Leg"][:, 2])
+
+
+def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
+    """Collar bone, shoulder, elbow, wrist, hand."""
+    name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
+    chest, acromion = out.axes["Chest"], points[f"{side}_acromion"]
+    other = points.get("right_acromion" if side == "left" else "left_acromion")
+    drop = 0.155 * np.linalg.norm(acromion - other) if other is not None else 0.06 * out.size
+    shoulder = acromion - drop * chest[:, 2]
+    out.axes[f"{name}Shoulder"] = chest
+    out.put(f"{name}Scapula", acromion - 0.25 * drop * chest[:, 2], chest, SIGMAS["one side"])
+    wrist, radial = _wrist(points, side)
+    elbow = None
+    marker = points.get(f"{side}_elbow_lateral", points.get(f"{side}_elbow_medial"))
+    if marker is not None:
+        plain = _outwards_plainly(chest, shoulder, marker, sign)
+        if wrist is None or radial is not None:
+            elbow = _elbow(out, points, side, sign, shoulder, wrist, radial, plain)
+        else:
+            elbow, wrist = _elbow_and_wrist(out, points, side, sign, shoulder, wrist, plain)
+    if elbow is None:
+        out.notes.append(f"{side} arm: no marker on the elbow; left out")
+        return
+    place, up, sigma = elbow
+    out.put(f"{name}Arm", shoulder, frame_along("Y", sign * (place - shoulder), "Z", up), SIGMAS["shoulder"])
+    if wrist is None:
+        out.notes.append(f"{side} forearm: no marker on the wrist; left out")
+        return
+    along = sign * (wrist - place)
+    axes = frame_along("Y", along, "Z", up) if radial is None else frame_along("Y", along, "X", radial)
+    out.put(f"{name}ForeArm", place, axes, sigma)
+    _hand(out, points, side, sign, wrist, axes, SIGMAS["alone"] if radial is None else SIGMAS["both"])
+
+
+def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """The wrist's centre and the direction from its ulnar to its radial side; None for what is not marked."""
+    radial, ulnar = points.get(f"{side}_wrist_radial"), points.get(f"{side}_wrist_ulnar")
+    if radial is not None and ulnar is not None:
+        return 0.5 * (radial + ulnar), _unit(radial - ulnar)
+    lone = [points[x] for x in (f"{side}_wrist", f"{side}_wrist_radial", f"{side}_wrist_ulnar") if x in points]
+    return (lone[0], None) if lone else (None, None)
+
+
+def _outwards_plainly(chest, shoulder, elbow, sign) -> np.ndarray:
+    """Where the outside of an elbow points when the arm has come down from a T-pose the short way."""
+    turn = quaternion.between(sign * chest[:, 1], elbow - shoulder)
+    return quaternion.rotate(turn, chest[:, 2])
+
+
+def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
+    """An elbow as `_elbow` and the wrist's centre, where a lone `marker` lies on the back of the wrist.
+
+    Which side is the back follows from the elbow, and the elbow from the wrist's centre.
+    """
+    inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
+    outwards = plain
+    for _ in range(4):
+        wrist = marker - inside * outwards
+        elbow = _elbow(out, points, side, sign, shoulder, wrist, None, plain)
+        outwards = elbow[1]
+    return elbow, wrist
+
+
+def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
+    """An elbow's centre, the direction from its medial to its lateral side, and the uncertainty."""
+    lateral = points.get(f"{side}_elbow_lateral", points.get(f"{side}_elbow_medial"))
+    if wrist is not None and f"{side}_elbow_medial" not in points:
+        half = out.size * HALF_WIDTHS["elbow"] + MARKER_RADIUS
+        outwards = _plane_beside(lateral, shoulder, wrist, half, -sign)
+        if outwards is not None:
+            return lateral - half * outwards, outwards, SIGMAS["one side"]
+    hint = plain if wrist is None or radial is None else sign * np.cross(radial, wrist - lateral)
+    return _hinge(out, points, side, "elbow", shoulder, hint)
+
+
+def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
+    """The normal of the plane through `above` and `below` that passes a marker at the distance `half`, towards the
+    marker; None where the joint is too straight to have such a plane.
+
+    Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker.
+    """
+    line = _unit(below - above)
+    away = (marker - above) - ((marker - above) @ line) * line
+    distance = float(np.linalg.norm(away))
+    if distance < half * 1.001:
+        return None
+    away /= distance
+    cosine = half / distance
+    aside = np.sqrt(1.0 - cosine**2) * np.cross(line, away)
+    for normal in (cosine * away + aside, cosine * away - aside):
+        place = marker - half * normal
+        fold = sign * np.cross(_unit(place - above), _unit(below - place))
+        if fold @ normal > 0.0:
+            return normal if np.linalg.norm(fold) > _STRAIGHT else None
+    return None
+
+
+def _hand(out, points, side, sign, wrist, forearm, sigma) -> None:
+    name = side.capitalize()
+    knuckle = points.get(f"{side}_knuckle")
+    axes = forearm
+    if knuckle is not None:  # the marker lies on the back of the hand, half its thickness above the bone
+        axes = frame_along("Y", sign * (knuckle - 0.02 * out.size * forearm[:, 2] - wrist), "X", forearm[:, 0])
+    out.put(f"{name}Hand", wrist, axes, sigma)
+    out.tips[f"{name}Hand"] = wrist + axes @ (out.size * (TIPS[f"{name}Hand"] - PLACES[f"{name}Hand"]))

@@ -1,0 +1,150 @@
+"""Which markers a recording has on which part of the body, and which anatomical points they mark.
+
+A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on,
+and that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from ...base.errors import InputError
+from .landmarks import LANDMARKS
+from .template import JOINTS
+
+UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
+"""Labels that recording software gives to markers that nobody has named."""
+_MOST = 0.8  # of a set's markers
+
+
+@dataclass(frozen=True)
+class MarkerSet:
+    """The markers of one protocol.
+
+    name: one word. segments: joint name (of `template.JOINTS`) -> labels of the markers that it carries.
+    landmarks: anatomical point (of `landmarks.LANDMARKS`) -> labels; several mark it by their mean.
+    aliases: another label -> the set's own. static: markers that may be missing in all but the static trial.
+    optional: markers that may be missing anywhere. ball: markers on a ball. other: markers on things that are no body.
+    about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments.
+    """
+
+    name: str
+    segments: Mapping[str, tuple[str, ...]]
+    landmarks: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    aliases: Mapping[str, str] = field(default_factory=dict)
+    static: frozenset[str] = frozenset()
+    optional: frozenset[str] = frozenset()
+    ball: tuple[str, ...] = ()
+    other: tuple[str, ...] = ()
+    about: str = ""
+
+    def __post_init__(self):
+        for name in ("segments", "landmarks"):
+            table = {key: tuple(labels) for key, labels in getattr(self, name).items()}
+            object.__setattr__(self, name, MappingProxyType(table))
+        object.__setattr__(self, "aliases", MappingProxyType(dict(self.aliases)))
+        for name in ("static", "optional"):
+            object.__setattr__(self, name, frozenset(getattr(self, name)))
+        for name in ("ball", "other"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        self._check()
+
+    def _check(self):
+        where = f"marker set {self.name}"
+        for joint in self.segments:
+            if joint not in JOINTS:
+                raise InputError(where, f"no segment {joint!r}", f"one of {', '.join(JOINTS)}")
+        for landmark in self.landmarks:
+            if landmark not in LANDMARKS:
+                raise InputError(where, f"no landmark {landmark!r}", f"one of {', '.join(sorted(LANDMARKS))}")
+        labels = self.labels
+        twice = sorted({label for label in labels if labels.count(label) > 1})
+        if twice:
+            raise InputError(where, f"marker {twice[0]!r} twice", "each marker on one segment")
+        unknown = sorted({x for group in self.landmarks.values() for x in group} - set(labels))
+        if unknown:
+            raise InputError(where, f"landmark on {unknown[0]!r}, which no segment carries", "a marker of a segment")
+        if not labels:
+            raise InputError(where, "no segment has a marker", "a line such as `segment Hips: LASI, RASI, SACR`")
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """All markers on the body, segment by segment."""
+        return tuple(label for group in self.segments.values() for label in group)
+
+    @property
+    def needed(self) -> frozenset[str]:
+        """Markers without which a trial is not of this set."""
+        return frozenset(self.labels) - self.static - self.optional
+
+    def lacking(self, labels: Sequence[str]) -> tuple[str, ...]:
+        """Those of `needed` that are not among `labels`, in the set's order."""
+        present = {self.renaming(labels).get(label, label) for label in labels}
+        return tuple(label for label in self.labels if label in self.needed and label not in present)
+
+    def segment_of(self, label: str) -> str | None:
+        """The joint that carries a marker; None where it lies on nothing."""
+        return next((joint for joint, group in self.segments.items() if label in group), None)
+
+    def renaming(self, labels: Sequence[str]) -> dict[str, str]:
+        """Old label -> the set's own, for those of `labels` that are called otherwise (alias, or another case)."""
+        own = (*self.labels, *self.ball, *self.other)
+        plain = {_plain(label): label for label in own} | {_plain(old): new for old, new in self.aliases.items()}
+        present = set(labels)
+        found: dict[str, str] = {}
+        for label in labels:
+            new = plain.get(_plain(label))
+            if label not in own and new is not None and new not in present and new not in found.values():
+                found[label] = new
+        return found
+
+    def clusters(self, labels: Sequence[str]) -> dict[str, tuple[str, ...]]:
+        """Segment -> those of its markers that are among `labels`; segments without any are left out."""
+        present = set(labels)
+        found = {joint: tuple(x for x in group if x in present) for joint, group in self.segments.items()}
+        return {joint: group for joint, group in found.items() if group}
+
+
+def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
+    """The set whose markers these are: of those of which most is there, the one that explains most of them.
+
+    labels: as recorded; those that nobody has named do not count. Up to a fifth of a set's markers may be missing, as
+    those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is
+    missing.
+    """
+    sets = list(sets)
+    named = [label for label in labels if not UNLABELED.match(label)]
+    judged = [(marker_set, _present(marker_set, named)) for marker_set in sets]
+    share = [len(present & s.needed) / max(len(s.needed), 1) for s, present in judged]
+    there = [(len(present), part, -len(s.labels), s) for (s, present), part in zip(judged, share) if part >= _MOST]
+    if there:
+        return max(there, key=lambda row: row[:3])[3]
+    if not sets:
+        raise InputError("marker sets", "none given", "at least one")
+    nearest, present = judged[share.index(max(share))]
+    missing = sorted(nearest.needed - present)
+    unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
+    raise InputError(
+        "markers", f"no marker set fits; nearest is {nearest.name}, of which {_some(missing)} missing"
+        + (f" ({_some(unknown, 'not in it')})" if unknown else ""),
+        "all markers of one set", "give a marker set of your own (--marker-set)",
+    )
+
+
+def _present(marker_set: MarkerSet, labels: Sequence[str]) -> set[str]:
+    renamed = marker_set.renaming(labels)
+    return {renamed.get(label, label) for label in labels} & set(marker_set.labels)
+
+
+def _plain(label: str) -> str:
+    return re.sub(r"[\s_\-.]", "", label).lower()
+
+
+def _some(names: Sequence[str], what: str = "") -> str:
+    """`4 are: A, B, C and 1 more`, or with `what` in place of `are`."""
+    shown = ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
+    verb = what or ("is" if len(names) == 1 else "are")
+    return f"{shown} {verb}"

@@ -1,0 +1,144 @@
+"""How far joints turn: limits on the angles of a chain's joints, held exactly (Fredriksson §5.3.1).
+
+A hinge is kept as angles and cannot leave its limits. A joint that turns all ways is kept as a quaternion; its angles
+are read here, of the two triples that mean the same rotation the one that offends less, and brought back to the limits
+after each step. A step that would lead over a limit is solved again so that it ends on it, with the turn in that
+direction held still: the other directions then find their best beside it. At a limit a joint stays held as long as the
+markers pull over it (an active set, as in Bertsekas 1982, projected Newton methods).
+
+Within some degrees of the pole of its axis order a joint's outer angles mean nothing; only the middle one's limit
+counts there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from .chain import Chain, Poses, angles_of, cross, own_axes, within
+from .elimination import Own
+
+_NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones mean nothing: 7 degrees
+_AT = 1e-7  # radians
+_HELD = 1e6  # curvature, m2 per radian2, of a turn that is held still
+_AXES = {"X": 0, "Y": 1, "Z": 2}
+
+
+def limited(chain: Chain) -> dict[str, np.ndarray]:
+    """The joints that turn all ways and have limits, by their axis order; the root has none."""
+    bound = np.isfinite(chain.low).any(axis=1) | np.isfinite(chain.high).any(axis=1)
+    found: dict[str, list[int]] = {}
+    for joint in range(1, len(chain.skeleton)):
+        if bound[joint] and chain.turning[joint]:
+            found.setdefault(chain.order[joint], []).append(joint)
+    return {order: np.array(joints) for order, joints in found.items()}
+
+
+def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[Poses, np.ndarray]:
+    """The poses with these joints (of `limited`) brought back to their limits and their angles noted; the angles
+    (J, 3, F) that count as they were before."""
+    local, angles = at.local.copy(), at.angles.copy()
+    before = angles.copy()
+    for order, group in joints.items():
+        angles[group] = before[group] = _read(local[group], order)
+        outside = (angles[group] > chain.high[group][..., None]) | (angles[group] < chain.low[group][..., None])
+        for joint, beyond in zip(group, outside.any(axis=1)):
+            if beyond.any():
+                _bring_back(chain, joint, np.flatnonzero(beyond), local, angles, before)
+    return Poses(at.root, local, angles), before
+
+
+def _bring_back(chain, joint, frames, local, angles, before) -> None:
+    """Bring one joint back in these frames, where it truly offends, in place."""
+    read = angles_of(chain, joint, local[joint][:, frames])
+    kept = np.where(_counts(read), within(chain, joint, read), read)
+    angles[joint][:, frames] = kept
+    before[joint][:, frames] = np.where(_counts(read), read, 0.0)
+    moves = np.any(kept != read, axis=0)
+    local[joint][:, frames[moves]] = quaternion.from_euler(kept[:, moves].T, chain.order[joint]).T
+
+
+def _read(q: np.ndarray, order: str) -> np.ndarray:
+    """Angles (..., 3, F) rad of rotations (..., 4, F), the middle within a quarter turn; at the pole as they come."""
+    i, j, k = (_AXES[letter] for letter in order)
+    sign = 1.0 if (j - i) % 3 == 1 else -1.0
+    w, v = q[..., 0, :], [q[..., 1 + axis, :] for axis in (i, j, k)]
+    # entries of the rotation's matrix, in the order's own axes
+    first = 2.0 * (sign * v[1] * v[2] - w * v[0]), 1.0 - 2.0 * (v[0] * v[0] + v[1] * v[1])
+    third = 2.0 * (sign * v[0] * v[1] - w * v[2]), 1.0 - 2.0 * (v[1] * v[1] + v[2] * v[2])
+    middle = np.arcsin(np.clip(2.0 * (sign * v[0] * v[2] + w * v[1]), -1.0, 1.0))
+    return np.stack([arctan2(-first[0], first[1]), middle, arctan2(-third[0], third[1])], axis=-2)
+
+
+def _counts(angles: np.ndarray) -> np.ndarray:
+    """Which angles (3, F) mean something: all, but near the pole the middle one alone."""
+    away = np.abs(np.cos(angles[1])) >= _NEAR_POLE
+    return np.stack([away, np.ones_like(away), away])
+
+
+def hold(
+    chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own, ahead: np.ndarray | None = None
+) -> np.ndarray:
+    """Hold still, in place in what is asked of the turns, the angles at a limit that would go on, and let those that a
+    first step led over a limit end on it; which joints are held: (J, F) bool.
+
+    slope: (J, 3, F), the derivative of half the cost by each joint's turns. ahead: the angles (J, 3, F) to which that
+    first step led, or None.
+    """
+    low, high = chain.low[..., None], chain.high[..., None]
+    stops = np.zeros(at.angles.shape, dtype=bool)
+    bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
+    touching = ((at.angles >= high - _AT) | (at.angles <= low + _AT)) & chain.free[..., None]
+    if ahead is not None:
+        over, under = ahead > high, ahead < low
+        stops |= over | under
+        bound = np.where(over, high, np.where(under, low, bound))
+    able = [*chain.hinges, *(joint for group in joints.values() for joint in group)]
+    for joint in able:
+        if touching[joint].any() or stops[joint].any():
+            _hold_joint(chain, joint, at.angles[joint], touching[joint], bound[joint], slope[joint], stops[joint], own)
+    idle = np.setdiff1d(np.arange(len(stops)), able)
+    stops[idle] = False
+    return stops.any(axis=1)
+
+
+def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> None:
+    """`hold` for one joint: `stops` (3, F) is completed, `own` changed, in place."""
+    frames = np.flatnonzero((touching | stops).any(axis=0))
+    here = angles[:, frames]
+    if chain.turning[joint]:
+        basis = own_axes(chain, joint, here)
+        rates = _inverse(basis)
+        means = _counts(here)
+    else:
+        basis = rates = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
+        means = np.broadcast_to(chain.free[joint][:, None], here.shape)
+    along = np.einsum("abf,af->bf", basis, slope[:, frames])
+    outward = np.where(here >= chain.high[joint][:, None] - _AT, along < 0.0, along > 0.0)
+    stops[:, frames] = ((touching[:, frames] & outward) | stops[:, frames]) & means
+    strength = np.where(stops[:, frames], _HELD, 0.0)
+    short = np.where(stops[:, frames], here - bound[:, frames], 0.0)
+    own.curvature[joint][..., frames] += np.einsum("naf,nbf,nf->abf", rates, rates, strength)
+    own.pull[joint][:, frames] += np.einsum("naf,nf->af", rates, strength * short)
+
+
+def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further: Poses) -> Poses:
+    """`further`, in place, with joints that limits hold (J, F) moved along the limit: their angles grow by what the
+    turns (J, 3, F) rad say, where a turn about a fixed axis would leave it."""
+    for joint in np.flatnonzero(held.any(axis=1)):
+        if chain.turning[joint]:
+            frames = np.flatnonzero(held[joint])
+            angles = at.angles[joint][:, frames]
+            rates = _inverse(own_axes(chain, joint, angles))
+            there = angles + np.einsum("naf,af->nf", rates, turns[joint][:, frames])
+            further.local[joint][:, frames] = quaternion.from_euler(there.T, chain.order[joint]).T
+    return further
+
+
+def _inverse(basis: np.ndarray) -> np.ndarray:
+    """How each angle grows with a turn: (3 angles, 3 components, F), the inverse of the axes (3 components, 3, F)."""
+    columns = basis[:, 0], basis[:, 1], basis[:, 2]
+    rows = np.stack([cross(columns[1], columns[2]), cross(columns[2], columns[0]), cross(columns[0], columns[1])])
+    size = np.einsum("af,af->f", columns[0], rows[0])
+    return rows / np.where(np.abs(size) < 1e-3, np.copysign(1e-3, size), size)

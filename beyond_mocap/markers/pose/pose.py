@@ -1,0 +1,355 @@
+"""The pose in every frame: the whole chain laid through all markers at once (Fredriksson §3.5.1, §5.3).
+
+Every frame is solved from the solution beside it (§5.3.3): some frames first, from their own markers and again from
+their solved neighbours, whichever comes out nearer; then those between, from both.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.errors import Cancelled, InputError
+from ...motion import quaternion
+from ...motion.motion import Motion
+from . import weights as marker_weights
+from .chain import Chain, Poses, chain, place, poses
+from .descent import HeldPoint, Task, descend
+from ..frames import placed as carried, rigid_fit
+from .residuals import seen_markers
+from .smooth import smooth
+from .start import first_poses
+
+_CHUNK = 512
+_COARSE_SECONDS = 1.0 / 60.0
+_ENOUGH = 0.3  # part of the markers that a frame must show to be solved
+_FEWEST = 4
+_DEAR, _FAR = 1.5, np.radians(40.0)  # doubted: costs so many times its neighbour, or turns a joint so far
+_FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # a jump in one frame; how long what lies between two of them may last
+_EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
+_LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
+_LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
+
+
+# Joints whose markers are hidden for a while follow what is solved before and after, not the rest pose.
+
+
+_NEAR = 2  # a joint is told by its own markers and by those of so many joints below it
+
+
+def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
+    """Of which joints markers are hidden that the recording shows elsewhere: (T, J) bool. there: (T, M) bool."""
+    usual = there.any(axis=0)
+    out = np.zeros((len(there), len(chain.skeleton)), dtype=bool)
+    for marker, joint in enumerate(chain.joint):
+        hidden = usual[marker] & ~there[:, marker]
+        for _ in range(_NEAR + 1):
+            if joint <= 0:
+                break
+            out[:, joint] |= hidden
+            joint = chain.skeleton.parents[joint]
+    return out
+
+
+def between(
+    chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray
+) -> tuple[Poses, np.ndarray]:
+    """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
+    joints any do: (J,) bool.
+
+    solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
+    telling frame a joint stays as it is there.
+    """
+    root = _slid(solved.root[:, known].T, known, frames)
+    local = np.empty((len(frames), len(chain.skeleton), 4))
+    some = told.any(axis=0)
+    for joint in range(len(chain.skeleton)):
+        use = known[told[:, joint]] if some[joint] else known
+        local[:, joint] = _turned(solved.local[joint][:, use].T, use, frames)
+    return poses(chain, root, local), some
+
+
+def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which known frames lie before and after each frame (indices), and how far between."""
+    after = np.clip(np.searchsorted(known, frames), min(1, len(known) - 1), len(known) - 1)
+    before = np.maximum(after - 1, 0)
+    span = np.maximum(known[after] - known[before], 1)
+    return before, after, np.clip((frames - known[before]) / span, 0.0, 1.0)
+
+
+def _slid(places: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Places (K, 3) between those of the known frames: (N, 3)."""
+    before, after, part = _around(known, frames)
+    return places[before] + part[:, None] * (places[after] - places[before])
+
+
+def _turned(turns: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
+    """Rotations (K, 4) between those of the known frames: (N, 4)."""
+    before, after, part = _around(known, frames)
+    return quaternion.slerp(turns[before], turns[after], part)
+
+
+@dataclass(frozen=True)
+class HeldBall:
+    """A ball in the hand: its centre stands still in the hand, and a seen marker lies on its surface.
+
+    joint: the hand's name. centre: (3,) m in its frame. radius: m. seen: (T, 3) m, the marker, NaN where not seen.
+    held: (T,) bool. weight: what it counts beside a body's marker.
+    """
+
+    joint: str
+    centre: np.ndarray
+    radius: float
+    seen: np.ndarray
+    held: np.ndarray
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
+class PoseSettings:
+    """weights: count deformed clusters' markers less (eq. 5.2). limits: keep joints within them. smoothness: seconds,
+    as `smooth` understands them; 0: each frame by itself. ball: a held ball that takes part."""
+
+    weights: bool = True
+    limits: bool = True
+    smoothness: float = 0.0
+    ball: HeldBall | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """What came out, for T frames of the model's M markers and J joints.
+
+    motion: the skeleton moving. residual: (T, M) m between the model's marker and the seen one, NaN where not seen.
+    weights: (T, M). single: (T, M) m, the same when each segment is laid through its own markers alone, NaN where it
+    has fewer than three. iterations: (T,) steps taken, 0 where a frame was not solved. at_limit: (T, J) bool. seconds:
+    the time it took. notes: lines for people.
+    """
+
+    motion: Motion
+    residual: np.ndarray
+    weights: np.ndarray
+    single: np.ndarray
+    iterations: np.ndarray
+    at_limit: np.ndarray
+    seconds: float
+    notes: tuple[str, ...] = ()
+
+
+def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, cancelled=None) -> Solved:
+    """The model's motion through a trial's markers.
+
+    model: a `MarkerModel`; trial: a `MarkerTrial` with its labels. progress(fraction, text) and cancelled() as
+    everywhere. InputError where the trial has hardly any of the model's markers.
+    """
+    began = time.perf_counter()
+    seen = _positions(model, trial)
+    solving = _Solving(_chain(model, settings.limits), seen, settings, trial.fps, _usual(model), progress, cancelled)
+    solving.run()
+    return solving.result(time.perf_counter() - began)
+
+
+def _chain(model, limited: bool) -> Chain:
+    """The chain of a model."""
+    freedom = model.freedom
+    made = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free, freedom.low, freedom.high,
+                 model.stiffness)
+    return made if limited else made.without_limits()
+
+
+def _usual(model) -> np.ndarray | None:
+    """sigma_s of every marker where the model knows it."""
+    known = getattr(model, "edge_sigma", None)
+    return None if known is None or np.shape(known) != np.shape(model.joint) else np.asarray(known, dtype=float)
+
+
+def _positions(model, trial) -> np.ndarray:
+    """The model's markers as seen: (T, M, 3) m, NaN where the trial does not have them."""
+    out = seen_markers(model, trial)
+    seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
+    if seen < _FEWEST:
+        raise InputError(
+            trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
+            "choose the model or marker set of this recording",
+        )
+    return out
+
+
+class _Solving:
+    """One run: the arrays (frames last) and what is known so far."""
+
+    def __init__(self, chain, seen, settings, fps, usual, progress, cancelled):
+        self.chain, self.settings, self.fps = chain, settings, fps
+        self.positions = seen
+        self.there = np.isfinite(seen).all(axis=-1)
+        self.weights = self._weights(usual)
+        self.seen = np.ascontiguousarray(np.where(self.there[..., None], seen, 0.0).transpose(1, 2, 0))
+        self.progress, self.cancelled = progress or (lambda part, text: None), cancelled or (lambda: False)
+        count = len(chain.skeleton)
+        self.poses = Poses(np.zeros((3, len(seen))), np.zeros((count, 4, len(seen))), np.zeros((count, 3, len(seen))))
+        self.poses.local[:, 0] = 1.0
+        self.cost, self.steps = np.full(len(seen), np.inf), np.zeros(len(seen), dtype=int)
+        self.held = np.zeros((count, len(seen)), dtype=bool)
+        self.drawn = np.maximum(chain.stiffness, _LEAST_STIFFNESS)
+        self.drawn[0] = 0.0
+        self.missing = missing(chain, self.there)
+        self.notes: list[str] = []
+        self.work_done, self.work = 0, 1
+        self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the work before all frames are smoothed
+
+    def _weights(self, usual) -> np.ndarray:
+        if not self.settings.weights:
+            return self.there.astype(float)
+        return marker_weights.weights(self.chain.joint, self.chain.places, self.positions, usual)
+
+    def run(self) -> None:
+        """Solve the frames that show enough, fill in the others."""
+        ever = self.there.any(axis=0).sum()
+        known = np.flatnonzero(self.there.sum(axis=1) >= max(_FEWEST, int(np.ceil(_ENOUGH * ever))))
+        if not len(known):
+            raise InputError("trial", "no frame shows enough markers", f"{_ENOUGH:.0%} of {ever}", "clean it first")
+        spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
+        coarse = np.unique(np.append(known[::spacing], known[-1]))
+        self.work = len(known)
+        self._solve(coarse, self._first(coarse))
+        for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
+            doubtful = self._doubtful(frames, source)
+            self._better_from(source[doubtful], frames[doubtful])
+        unsure = np.flatnonzero(self.missing[coarse].any(axis=1))
+        if len(unsure):
+            self._solve_between(coarse[unsure], coarse)
+        others = np.setdiff1d(known, coarse)
+        if len(others):
+            self._solve_between(others, coarse)
+        self._unflip(known)
+        self._fill(known)
+        if self.settings.smoothness > 0.0:
+            self._smooth()
+
+    def _unflip(self, known: np.ndarray) -> None:
+        """Short stretches that jump away and back again (a straight elbow can be turned out two ways) are solved again
+        from the frames around them, and kept where that costs about as little."""
+        local = self.poses.local[..., known]
+        near = np.abs(np.einsum("jaf,jaf->jf", local[..., 1:], local[..., :-1]))
+        jumps = np.flatnonzero(np.any(near < np.cos(0.5 * _FLIP), axis=0))
+        suspect = np.zeros(len(known), dtype=bool)
+        for first, last in zip(jumps[:-1], jumps[1:]):
+            if known[last] - known[first] <= _FLIP_SECONDS * self.fps:
+                suspect[first + 1 : last + 1] = True
+        if not suspect.any() or suspect.all():
+            return
+        frames, around = known[suspect], known[~suspect]
+        every = np.ones((len(around), len(self.chain.skeleton)), dtype=bool)
+        start = between(self.chain, self.poses, around, every, frames)[0]
+        leaning = np.full((len(self.chain.skeleton), len(frames)), _LEANING)
+        leaning[0] = 0.0
+        for part in self._chunks(frames):
+            here = frames[part]
+            task = self._task(here, start.frames(part), leaning[:, part])
+            self._accept(here, descend(task, start.frames(part)), 1.5, 1e-5)
+
+    def _smooth(self) -> None:
+        """All frames together."""
+        def watch(part):
+            if self.cancelled():
+                raise Cancelled("reconstruction cancelled")
+            self.progress(self.alone + (1.0 - self.alone) * part, "smoothing poses")
+
+        everything = np.arange(len(self.cost))
+        at, self.held = smooth(self._task(everything), self.poses, self.settings.smoothness, self.fps, watch)
+        self.poses.put(everything, at)
+
+    def _solve_between(self, frames: np.ndarray, known: np.ndarray) -> None:
+        """Solve frames from how those beside them stand; joints that miss markers lean on it."""
+        start, some = between(self.chain, self.poses, known, ~self.missing[known], frames)
+        leaning = np.where(self.missing[frames].T & some[:, None], _LEANING, 0.0)
+        for part in self._chunks(frames):
+            here = frames[part]
+            lean = start.frames(part) if leaning[:, part].any() else None
+            self._keep(here, descend(self._task(here, lean, leaning[:, part]), start.frames(part)))
+
+    def _task(self, frames: np.ndarray, lean: Poses | None = None, leaning: np.ndarray | None = None) -> Task:
+        """What these frames are to come near to."""
+        point, ball = None, self.settings.ball
+        if ball is not None:
+            there = np.isfinite(ball.seen).all(axis=-1) & ball.held
+            point = HeldPoint(self.chain.skeleton.index(ball.joint), np.asarray(ball.centre, dtype=float), ball.radius,
+                              np.where(there[:, None], ball.seen, 0.0)[frames].T, ball.weight * there[frames])
+        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, leaning, point, _EVEN)
+
+    def _chunks(self, frames: np.ndarray):
+        """Slices of a list of frames, with a look at the clock between."""
+        for first in range(0, len(frames), _CHUNK):
+            if self.cancelled():
+                raise Cancelled("reconstruction cancelled")
+            self.progress(self.alone * min(self.work_done / self.work, 1.0), "solving poses")
+            yield slice(first, first + _CHUNK)
+            self.work_done += min(_CHUNK, len(frames) - first)
+
+    def _first(self, frames: np.ndarray) -> Poses:
+        """Poses from each frame's own markers."""
+        return first_poses(self.chain, self.seen[..., frames], self.weights[frames].T)
+
+    def _solve(self, frames: np.ndarray, start: Poses) -> None:
+        """Solve these frames from there, and keep what comes out."""
+        for part in self._chunks(frames):
+            self._keep(frames[part], descend(self._task(frames[part]), start.frames(part)))
+
+    def _keep(self, frames: np.ndarray, arrived) -> None:
+        self.poses.put(frames, arrived.poses)
+        self.cost[frames], self.steps[frames] = arrived.cost, arrived.steps
+        self.held[:, frames] = arrived.held
+
+    def _doubtful(self, frames: np.ndarray, source: np.ndarray) -> np.ndarray:
+        """Which frames may have come out in another valley than those beside them: dearer, or far turned."""
+        turned = np.abs(np.einsum("jaf,jaf->jf", self.poses.local[..., frames], self.poses.local[..., source]))
+        dear = self.cost[frames] > _DEAR * self.cost[source] + 1e-6
+        return np.flatnonzero(dear | np.any(turned < np.cos(0.5 * _FAR), axis=0))
+
+    def _better_from(self, source: np.ndarray, frames: np.ndarray) -> None:
+        """Solve frames again from other frames' solutions, and keep what comes out clearly nearer."""
+        for part in self._chunks(frames):
+            arrived = descend(self._task(frames[part]), self.poses.frames(source[part]))
+            self._accept(frames[part], arrived, 0.999, -1e-9)
+
+    def _accept(self, frames: np.ndarray, arrived, share: float, more: float) -> None:
+        """Keep what costs less than this share of what is there, and a little more."""
+        better = arrived.cost < share * self.cost[frames] + more
+        if better.any():
+            chosen = frames[better]
+            self.poses.put(chosen, arrived.poses.frames(better))
+            self.cost[chosen], self.held[:, chosen] = arrived.cost[better], arrived.held[:, better]
+        self.steps[frames] += arrived.steps
+
+    def _fill(self, known: np.ndarray) -> None:
+        """Frames with hardly any markers lie between those beside them."""
+        blind = np.setdiff1d(np.arange(len(self.cost)), known)
+        if len(blind):
+            told = np.ones((len(known), len(self.chain.skeleton)), dtype=bool)
+            self.poses.put(blind, between(self.chain, self.poses, known, told, blind)[0])
+            self.notes.append(f"{len(blind)} of {len(self.cost)} frames show too few markers and are interpolated")
+
+    def result(self, seconds: float) -> Solved:
+        """What came out."""
+        motion = Motion(self.chain.skeleton, self.poses.root.T, np.moveaxis(self.poses.local, -1, 0), self.fps)
+        put = place(self.chain, self.poses)
+        away = (put.markers + put.origin).transpose(2, 0, 1) - self.positions
+        residual = np.sqrt(np.sum(away**2, axis=-1))
+        return Solved(motion, residual, self.weights, single_residual(self.chain, self.positions), self.steps,
+                      self.held.T.copy(), seconds, tuple(self.notes))
+
+
+def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:
+    """Residuals (T, M) m when every segment is laid through its own markers alone (§3.4.2); NaN where it has fewer
+    than three seen. seen: (T, M, 3) m."""
+    out = np.full(seen.shape[:2], np.nan)
+    for joint in np.unique(chain.joint):
+        own = np.flatnonzero(chain.joint == joint)
+        enough = np.isfinite(seen[:, own]).all(axis=-1).sum(axis=1) > 2
+        if enough.any():
+            fit = rigid_fit(chain.places[own], seen[np.ix_(enough, own)])
+            away = carried(fit, chain.places[own]) - seen[np.ix_(enough, own)]
+            out[np.ix_(enough, own)] = np.sqrt(np.sum(away**2, axis=-1))
+    return out

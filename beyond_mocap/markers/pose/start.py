@@ -1,0 +1,91 @@
+"""A first pose from the markers of one frame alone: from the root outward, each joint as its own markers say.
+
+It only has to lie in the right valley: `pose` goes on from there. The paper found poses by single segments too uneven
+to start every frame from (§5.3.3); here they start some frames, and the others start from what is solved beside them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...motion import quaternion
+from .chain import Chain, Poses, angles_of, matrices, multiply, within
+
+_BEYOND = 0.01  # how much the next joint's markers count beside a joint's own; those behind it this much less again
+_FAITH = 4e-4  # m2: how much the parent's direction counts, for what markers leave open
+
+
+def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Poses | None = None) -> Poses:
+    """Poses of frames by themselves.
+
+    seen: (M, 3, F) m, anything where the weight (M, F) is 0. guess: local rotations to lean on where markers leave a
+    joint open; None: the rest pose.
+    """
+    skeleton, frames = chain.skeleton, weights.shape[-1]
+    rest, distance = _rest(chain)
+    local = np.zeros((len(skeleton), 4, frames))
+    local[:, 0] = 1.0
+    lean = local.copy() if guess is None else guess.local
+    angles = np.zeros((len(skeleton), 3, frames))
+    share = weights * _BEYOND ** distance[0][:, None]
+    world = [_whole(rest, seen, share)]
+    middle = _mean(rest, share), _mean(seen, share)
+    root = middle[1] - np.einsum("abf,bf->af", matrices(world[0]), middle[0])
+    local[0], joints = world[0], [root]
+    for joint in range(1, len(skeleton)):
+        parent = skeleton.parents[joint]
+        joints.append(joints[parent] + np.einsum("abf,b->af", matrices(world[parent]), skeleton.offsets[joint]))
+        before = multiply(world[parent], lean[joint])
+        near = np.flatnonzero(np.isfinite(distance[joint]))
+        share = weights[near] * _BEYOND ** distance[joint][near][:, None]
+        arms = rest[near] - chain.skeleton.rest_positions[joint]
+        world.append(_about(arms, seen[near] - joints[joint], share, before))
+        local[joint] = multiply(world[parent] * np.array([1.0, -1.0, -1.0, -1.0])[:, None], world[joint])
+        if not chain.turning[joint]:
+            angles[joint] = within(chain, joint, angles_of(chain, joint, local[joint]))
+            local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T
+            world[joint] = multiply(world[parent], local[joint])
+    return Poses(root, local, angles)
+
+
+def _rest(chain: Chain) -> tuple[np.ndarray, np.ndarray]:
+    """Markers in the rest pose (M, 3) m, and how many joints (J, M) they lie below each joint, inf where not."""
+    distance = np.full((len(chain.skeleton), len(chain.joint)), np.inf)
+    for marker, joint in enumerate(chain.joint):
+        steps = 0
+        while joint >= 0:
+            distance[joint, marker] = steps
+            joint, steps = chain.skeleton.parents[joint], steps + 1
+    return chain.skeleton.rest_positions[chain.joint] + chain.places, distance
+
+
+def _mean(points: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Weighted mean (3, F) of points (M, 3) or (M, 3, F) by shares (M, F)."""
+    points = points[..., None] if points.ndim == 2 else points
+    return (share[:, None] * points).sum(axis=0) / np.maximum(share.sum(axis=0), 1e-12)
+
+
+def _whole(rest: np.ndarray, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Rotations (4, F) that turn the resting markers (M, 3) about their mean onto the seen ones (M, 3, F)."""
+    arms = rest[..., None] - _mean(rest, share)
+    return _best(np.einsum("mf,maf,mbf->abf", share, seen - _mean(seen, share), arms))
+
+
+def _about(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Rotations (4, F) about a joint that turn arms (N, 3) onto seen ones (N, 3, F), leaning on `before` (4, F)."""
+    return _best(np.einsum("mf,maf,mb->abf", share, seen, arms) + _FAITH * matrices(before))
+
+
+def _best(profile: np.ndarray) -> np.ndarray:
+    """The rotations (4, F) with the largest sum of products with these matrices (3, 3, F).
+
+    Davenport's method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot come out mirrored.
+    """
+    b = np.moveaxis(profile, -1, 0)
+    k = np.empty((len(b), 4, 4))
+    trace = np.trace(b, axis1=1, axis2=2)
+    k[:, 0, 0] = trace
+    k[:, 0, 1:] = np.stack([b[:, 2, 1] - b[:, 1, 2], b[:, 0, 2] - b[:, 2, 0], b[:, 1, 0] - b[:, 0, 1]], axis=-1)
+    k[:, 1:, 0] = k[:, 0, 1:]
+    k[:, 1:, 1:] = b + np.swapaxes(b, 1, 2) - trace[:, None, None] * np.eye(3)
+    return np.ascontiguousarray(np.linalg.eigh(k)[1][:, :, -1].T)

@@ -1,0 +1,403 @@
+"""The recipe from optical markers to a moving skeleton (Fredriksson §5): named, cleaned, modelled, posed, filtered."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .. import __version__
+from ..base.settings import defaults, setting
+from ..base.errors import Cancelled, InputError
+from .cleaning.clean import Cleaned, clean
+from .model.model import MarkerModel
+from .pose.pose import HeldBall, PoseSettings, Solved, solve
+from .trial import MarkerTrial
+from ..motion.motion import Motion
+
+_DEFAULTS = defaults("markers")
+FILTERS = setting("markers", "filter").choice_names
+RELEASES = setting("markers", "release").choice_names
+_SMOOTHNESS = setting("markers", "smoothness")
+LEAST_MARKERS = 0.5
+"""Share of a model's markers that a trial must have."""
+_TOLD_FLOOR = 0.02  # metres
+_FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class ReconstructSettings:
+    """What may be chosen; the settings table says what each means. marker_set: None: the shipped set that fits.
+    release: "auto": looked for where a marker is on a ball, or the file's name tells a throw's speed."""
+
+    marker_set: object | None = None
+    weights: bool = _DEFAULTS["weights"]
+    limits: bool = _DEFAULTS["limits"]
+    smoothness: float = _DEFAULTS["smoothness"]
+    filter: str = _DEFAULTS["filter"]
+    cutoff: float = _DEFAULTS["cutoff"]
+    plant: bool = _DEFAULTS["plant"]
+    floor: bool = _DEFAULTS["floor"]
+    radius: float | None = _DEFAULTS["radius"]
+    hold_ball: bool = _DEFAULTS["hold_ball"]
+    ball: str = _DEFAULTS["ball"]
+    release: str = _DEFAULTS["release"]
+
+    def __post_init__(self):
+        for name, choices in (("filter", FILTERS), ("release", RELEASES)):
+            if getattr(self, name) not in choices:
+                raise InputError(name, f"{getattr(self, name)!r}", f"one of {', '.join(choices)}")
+        least, most = _SMOOTHNESS.least, _SMOOTHNESS.most
+        if not least <= self.smoothness <= most:
+            raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
+
+
+@dataclass(frozen=True, eq=False)
+class Reconstruction:
+    """What came out.
+
+    motion: at the trial's rate, where the markers are. floor: height in metres of the floor that its feet stood on when
+    it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
+    markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters.
+    cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`. seconds:
+    of each step. warnings: lines.
+    """
+
+    motion: Motion
+    model: MarkerModel
+    trial: MarkerTrial
+    raw: MarkerTrial
+    solved: Solved
+    cleaned: Cleaned
+    release: object | None = None
+    held: np.ndarray | None = None
+    floor: float = 0.0
+    grounded: bool = False
+    seconds: dict[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def lowered(self) -> float:
+        """Metres by which motion and trial stand lower than the markers were recorded."""
+        return self.floor if self.grounded else 0.0
+
+    def on_floor(self) -> Motion:
+        """The motion with its floor at height 0, as clips of a library stand."""
+        return self.motion if self.grounded else moved_down(self.motion, self.floor)
+
+    def report(self) -> dict:
+        """The figures, for JSON."""
+        from .report.reconstruction import figures
+
+        return {"version": __version__, **figures(self)}
+
+
+def reconstruct(
+    trial: MarkerTrial,
+    static: MarkerTrial | None = None,
+    model: MarkerModel | None = None,
+    settings: ReconstructSettings = ReconstructSettings(),
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Reconstruction:
+    """The skeleton that moved under the markers of a trial.
+
+    static: the same markers on the same standing body, from which the model is made; without one it is made of the
+    trial itself. model: one that was made before. InputError where markers are of no known set, where the static or the
+    model is of another body or set, where the markers are mirrored or too few. Cancelled where the user wants out.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):  # the same bits everywhere; and small systems are slower on several
+        return _reconstruct(trial, static, model, settings, _Road(progress, cancelled), cancelled)
+
+
+def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Road, cancelled) -> Reconstruction:
+    """`reconstruct`, on one thread."""
+    with road.step("clean", 0.1):
+        marker_set = set_of(trial, model, settings)
+        seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
+        if model is not None:
+            _check_fits(model, seen)
+        road.tell(_checked(seen, still, marker_set, model))
+        cleaned = _tidied(seen, marker_set, model, road.inner(0.0, 0.1), cancelled)
+        tidy, told = cleaned.trial, cleaned.for_pose()  # long gaps are filled for the eye, not as evidence
+        road.tell(cleaned.report.lines)
+    with road.step("model", 0.45):
+        if model is None:
+            still = None if still is None else _tidied(still, marker_set, None, None, cancelled).for_pose()
+            model = _calibrated(marker_set, told, still, road.inner(0.1, 0.45), cancelled)
+            road.tell(model.notes)
+    with road.step("pose", 0.85):
+        solved = _posed(model, told, marker_set, settings, road, cancelled)
+        road.tell([*solved.notes, *_far_off(solved, model)])
+    with road.step("filter", 0.92):
+        motion, held = _filtered(solved, model, seen, settings, road)
+    with road.step("floor", 0.94):
+        floor = _floor(model, tidy, settings, road)
+        down = floor if settings.floor else 0.0
+        motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
+    with road.step("release", 1.0):
+        found = _release(seen, motion, model, marker_set, settings, road)
+    return Reconstruction(
+        motion, model, tidy, trial, solved, cleaned, found, held, floor, settings.floor, road.seconds,
+        tuple(road.warnings),
+    )
+
+
+class _Road:
+    """What is told on the way: progress, seconds of each step, warnings; and whether the user wants out."""
+
+    def __init__(self, progress, cancelled):
+        self._progress, self._cancelled = progress, cancelled
+        self._done = 0.0
+        self.seconds: dict[str, float] = {}
+        self.warnings: list[str] = []
+
+    @contextmanager
+    def step(self, name: str, until: float):
+        """One step; `until`: the share of the whole that is done after it."""
+        self.check()
+        if self._progress:
+            self._progress(self._done, name)
+        begun = time.perf_counter()
+        yield
+        self.seconds[name] = time.perf_counter() - begun
+        self._done = until
+
+    def inner(self, low: float, high: float) -> Progress | None:
+        """The progress of a part of the way, from 0 to 1, as that of the whole."""
+        if self._progress is None:
+            return None
+        return lambda fraction, text="": self._progress(low + (high - low) * fraction, text)
+
+    def tell(self, lines) -> None:
+        """Lines for people, each once."""
+        self.warnings += [line for line in lines if line not in self.warnings]
+
+    def check(self) -> None:
+        if self._cancelled is not None and self._cancelled():
+            raise Cancelled("cancelled")
+
+
+def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructSettings):
+    """The set that a trial's markers are of: the one chosen, the model's own, or the shipped one that fits; None for a
+    model of a set that is not shipped."""
+    if settings.marker_set is not None:
+        return settings.marker_set
+    from .files.marker_set_text import shipped_sets
+    from .model.marker_set import recognise
+
+    sets = shipped_sets()
+    if model is not None:
+        return next((one for one in sets if one.name == model.set_name), None)
+    try:
+        return recognise(trial.labels, sets)
+    except InputError as error:
+        raise InputError(trial.name, str(error)) from None  # labels do not know their file
+
+
+def named_by(trial: MarkerTrial, marker_set) -> MarkerTrial:
+    """The trial under the set's own names."""
+    from .naming import named_as
+
+    return trial if marker_set is None else named_as(trial, marker_set)
+
+
+def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> dict[str, tuple[str, ...]]:
+    """Segment -> those of its markers that the trial has."""
+    if marker_set is not None:
+        return marker_set.clusters(trial.labels)
+    names = model.skeleton.names
+    found = {names[joint]: tuple(model.markers[i] for i in rows if model.markers[i] in trial.labels)
+             for joint, rows in model.clusters().items()}
+    return {name: labels for name, labels in found.items() if labels}
+
+
+def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
+    """Whether the markers are mirrored, or those of somebody else than the static's."""
+    from .checks import check, some, unused
+
+    clusters = clusters_of(marker_set, model, trial)
+    others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
+    lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
+    gone = [f"of the set {marker_set.name} there is no {some(lacking)}"] if lacking else []
+    return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
+
+
+def modelled(
+    trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
+    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
+) -> MarkerModel:
+    """The model alone, as `reconstruct` makes it of a trial and its static. Raises as that does."""
+    marker_set = set_of(trial, None, settings)
+    seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
+    _checked(seen, still, marker_set, None)
+    tidy, still = (None if one is None else _tidied(one, marker_set, None, None, cancelled).for_pose()
+                   for one in (seen, still))
+    return _calibrated(marker_set, tidy, still, progress, cancelled)
+
+
+def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
+    """The trial under the set's names, its frames on even times."""
+    from .frame_times import evenly
+
+    return evenly(named_by(trial, marker_set))
+
+
+def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Cleaned:
+    """A trial under the set's names, cleaned."""
+    return clean(trial, clusters_of(marker_set, model, trial), progress=progress, cancelled=cancelled)
+
+
+def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
+    from .model.calibrate import calibrate
+    from .checks import some
+
+    try:
+        return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)
+    except InputError as error:
+        lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
+        if not lacking:
+            raise
+        raise InputError(still.name, f"{error}; it lacks {some(lacking)}") from None
+
+
+def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
+    from .checks import some
+
+    lacking = [label for label in model.markers if label not in trial.labels]
+    if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
+        raise InputError(
+            trial.name,
+            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some(lacking)}",
+            "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
+        )
+
+
+def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:
+    """The pose; where a ball is to be held, once without it to find out how it is, and again with it."""
+    how = PoseSettings(weights=settings.weights, limits=settings.limits, smoothness=settings.smoothness)
+    label = _ball_label(model, marker_set, trial) if settings.hold_ball else None
+    solved = solve(model, trial, how, road.inner(0.45, 0.85 if label is None else 0.65), cancelled)
+    if label is None:
+        if settings.hold_ball:
+            road.tell(["no marker on a ball: nothing is held"])
+        return solved
+    found = _release(trial, solved.motion, model, marker_set, replace(settings, release="auto"), road)
+    if found is None or found.how != "ball":
+        road.tell([f"{label} does not tell how the ball is held: it takes no part in the pose"])
+        return solved
+    hand = f"{found.side.capitalize()}Hand"
+    held = np.arange(len(trial)) < found.frame
+    ball = HeldBall(hand, found.centre, found.radius, trial.positions[:, trial.index(label)], held)
+    return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
+
+
+def _far_off(solved: Solved, model: MarkerModel) -> list[str]:
+    """A line where markers and model do not fit together, or a part of them does not."""
+    seen = np.isfinite(solved.residual)
+    if not seen.any():
+        return []
+    mean = float(solved.residual[seen].mean())
+    count = np.maximum(seen.sum(axis=0), 1)
+    each = np.where(seen, solved.residual, 0.0).sum(axis=0) / count
+    worst = [i for i in np.argsort(-each)[:4] if each[i] > _FAR_MARKER]
+    if mean <= _FAR_MEAN and not worst:
+        return []
+    told = ", ".join(f"{model.markers[i]} {1000.0 * each[i]:.0f}" for i in worst)
+    off = f"markers are {1000.0 * mean:.0f} mm off on average" + (f" (mm: {told})" if told else "")
+    return [f"{off}: model, static or marker set may be another's, or labels exchanged"]
+
+
+def _ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | None:
+    """The first marker of the model or its set that lies on a ball and is in the trial."""
+    labels = ((model.ball.label,) if model.ball else ()) + (() if marker_set is None else marker_set.ball)
+    return next((label for label in labels if label in trial.labels), None)
+
+
+def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, road: _Road):
+    """The motion after both filters, and which points of the feet are held. trial: as it was seen, no gap filled."""
+    from .pose.butterworth import butterworth
+    from .pose.kalman import kalman
+    from .pose.plant_filter import plant_filter
+
+    motion = solved.motion
+    if settings.filter == "butterworth":
+        out = butterworth(motion, settings.cutoff)
+    elif settings.filter == "kalman":
+        out = kalman(motion, told_by_markers(model, trial), settings.cutoff)
+    if settings.filter != "none":
+        motion = out.motion
+        road.tell(out.notes)
+    if not (settings.plant and _has_legs(motion)):
+        return motion, None
+    planted = plant_filter(motion)
+    return planted.motion, planted.held
+
+
+def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
+    """(T, J) share of each joint's own markers that are seen; 1 for joints that carry none."""
+    from .pose.residuals import seen_markers
+
+    seen = np.isfinite(seen_markers(model, trial)).all(axis=-1)
+    worth = np.ones((len(trial), len(model.skeleton)))
+    for joint, rows in model.clusters().items():
+        worth[:, joint] = seen[:, rows].mean(axis=1)
+    return worth
+
+
+def _has_legs(motion: Motion) -> bool:
+    from ..motion.humanoid import identify
+
+    try:
+        identify(motion.skeleton)
+    except InputError:
+        return False
+    return True
+
+
+def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
+    """Height in metres of the floor, told where it is not at 0."""
+    from .floor import floor_under
+
+    floor = floor_under(model, trial)
+    if abs(floor) > _TOLD_FLOOR:
+        done = "markers and motion were moved so that it is at 0" if settings.floor else "--floor moves it to 0"
+        road.tell([f"the floor lies at {floor:+.3f} m; {done}"])
+    return floor
+
+
+def moved_down(motion: Motion, by: float) -> Motion:
+    """The motion lower by so many metres."""
+    return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, by]) if by else motion
+
+
+def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
+    return trial.with_positions(trial.positions - [0.0, 0.0, by]) if by else trial
+
+
+def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
+    """When and how the ball left the hand, where that is asked for; it lies there as the model says, if it says so."""
+    from .release.radar import radar_speed
+
+    label = _ball_label(model, marker_set, trial)
+    told = label is not None or radar_speed(trial.name) is not None
+    if settings.release == "no" or (settings.release == "auto" and not told):
+        return None
+    from .release.release import ReleaseSettings, release
+
+    asked = ReleaseSettings(label, settings.radius, ball=settings.ball)
+    if model.ball is not None and model.ball.label == label:
+        side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"
+        asked = replace(asked, radius=asked.radius or model.ball.radius, hand=side, centre=model.ball.centre)
+    try:
+        return release(trial, motion, asked)
+    except InputError as error:
+        road.tell([f"no release found: {error}"])
+        return None

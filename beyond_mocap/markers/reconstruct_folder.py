@@ -1,0 +1,197 @@
+"""The recipe for a folder of trials: which are statics, which belong to one session, one model for all of a subject.
+
+A folder's own files are one session; where it has folders below, each of these is one. A static trial is told by its
+name, and serves the trials of its session whose markers and body it has. Trials that share a static share the model
+that is made of it, and the models of several sessions of one subject get one skeleton (Fredriksson §5.2.3); trials
+without a static are modelled from their own motion.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..base.errors import BeyondMocapError, Cancelled, InputError
+from .checks import check
+from .model.model import MarkerModel
+from .trial import MarkerTrial
+from .reconstruct import Reconstruction, ReconstructSettings, modelled, named_by, reconstruct, set_of
+
+SUFFIXES = (".c3d", ".trc")
+_STATIC = re.compile(r"static|calib|(^|[^a-z])cal([^a-z]|$)|[tna][-_ ]?pose|standing", re.IGNORECASE)
+_SAME_MARKERS = 0.8  # of a trial's markers that its static must have
+
+Read = Callable[[Path], MarkerTrial]
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One file of a folder. name: what its results are called, with its session before it. session: its folder below
+    the one that was asked for, "" for that itself."""
+
+    path: Path
+    name: str
+    session: str
+
+    @property
+    def is_static(self) -> bool:
+        """Whether its name says that the body only stands."""
+        return bool(_STATIC.search(self.path.stem))
+
+
+@dataclass(frozen=True, eq=False)
+class Made:
+    """What became of one trial: the reconstruction, or the error that says why there is none. static: its static, or
+    None. note: why a static that was there is not its own, or ""."""
+
+    recording: Recording
+    made: Reconstruction | None
+    error: str = ""
+    static: Recording | None = None
+    note: str = ""
+
+
+def recordings_of(folder: Path) -> list[Recording]:
+    """All recordings of markers in a folder and in those below it, by name. InputError where there is none."""
+    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES and path.is_file())
+    if not paths:
+        raise InputError(folder, "holds no .c3d and no .trc", "recordings of markers", "choose another folder")
+    bare = [path.relative_to(folder).with_suffix("").as_posix() for path in paths]
+    names = [name if bare.count(name) == 1 else name + path.suffix.lower().replace(".", "_")
+             for name, path in zip(bare, paths)]
+    sessions = [path.parent.relative_to(folder).as_posix() for path in paths]
+    return [Recording(path, name, session.removeprefix(".")) for path, name, session in zip(paths, names, sessions)]
+
+
+def reconstruct_folder(
+    folder: Path,
+    read: Read,
+    settings: ReconstructSettings = ReconstructSettings(),
+    model: MarkerModel | None = None,
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> Iterator[Made]:
+    """Every trial of a folder, one after the other; what cannot be made is told and does not stop the others.
+
+    read: reads one file. model: for all of them, instead of models made here. InputError for a folder without trials.
+    """
+    recordings = recordings_of(folder)
+    statics, moving = _told_apart(recordings, read)
+    plans = [_planned(one, read, statics if model is None else [], settings) for one in moving]
+    models = _models(plans, read, settings, cancelled)
+    for number, plan in enumerate(plans):
+        if cancelled is not None and cancelled():
+            raise Cancelled("cancelled")
+        part = _part_of(progress, number, len(plans), plan.recording.name)
+        yield _made(plan, read, settings, model or models.get(plan.static_path), part, cancelled)
+
+
+@dataclass(frozen=True, eq=False)
+class _Plan:
+    """A trial, its static as read or None, why it cannot be read, and why a static is not its own."""
+
+    recording: Recording
+    static: tuple[Recording, MarkerTrial] | None = None
+    error: str = ""
+    subject: str = field(default="")
+    note: str = ""
+
+    @property
+    def static_path(self) -> Path | None:
+        return None if self.static is None else self.static[0].path
+
+
+def _told_apart(recordings: Sequence[Recording], read: Read):
+    """The statics, read, and the other recordings. Where all have the names of statics they are trials too; a static
+    that cannot be read is told as a trial."""
+    if all(one.is_static for one in recordings):
+        return [], list(recordings)
+    statics, moving = [], []
+    for one in recordings:
+        if not one.is_static:
+            moving.append(one)
+            continue
+        try:
+            statics.append((one, read(one.path)))
+        except (BeyondMocapError, OSError):
+            moving.append(one)
+    return statics, moving
+
+
+def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings) -> _Plan:
+    try:
+        trial = read(one.path)
+        static, note = _static_for(one, trial, statics, settings)
+        return _Plan(one, static, subject=trial.subject, note=note)
+    except (BeyondMocapError, OSError) as error:
+        return _Plan(one, error=str(error))
+
+
+def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
+    """The static of a trial's session that has its markers and body, of several the one whose name is likest, or None;
+    and a line on one that is of another body, or ""."""
+    if not statics:
+        return None, ""
+    marker_set = set_of(trial, None, settings)
+    named = named_by(trial, marker_set)
+    wanted = set(named.labels) & set(marker_set.labels)
+    fits, note = [], ""
+    for recording, static in statics:
+        other = named_by(static, marker_set)
+        shared = len(wanted & set(other.labels)) / max(len(wanted), 1)
+        same_name = not (trial.subject and static.subject and trial.subject != static.subject)
+        if recording.session != one.session or not same_name or shared < _SAME_MARKERS:
+            continue
+        try:
+            check(named, other, marker_set.clusters(named.labels))
+        except InputError as error:
+            note = f"goes without a static: {error}"
+            continue
+        fits.append((_alike(recording.path.stem, one.path.stem), shared, (recording, static)))
+    return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
+
+
+def _alike(a: str, b: str) -> int:
+    """How many letters two names begin with in common."""
+    return next((i for i, (x, y) in enumerate(zip(a, b)) if x != y), min(len(a), len(b)))
+
+
+def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Path, MarkerModel]:
+    """Static -> its model, made with the first trial it serves; sessions of one subject get one skeleton."""
+    first = {plan.static_path: plan for plan in reversed(plans) if plan.static is not None}
+    models: dict[Path, MarkerModel] = {}
+    for path, plan in reversed(first.items()):
+        try:
+            models[path] = modelled(read(plan.recording.path), plan.static[1], settings, cancelled=cancelled)
+        except (InputError, OSError):
+            continue  # is told when its trials are made
+    groups: dict[tuple, list[Path]] = {}
+    for path, own in models.items():
+        groups.setdefault((first[path].subject, own.set_name, own.skeleton.names), []).append(path)
+    for paths in groups.values():
+        if len({first[path].recording.session for path in paths}) > 1:
+            from .model.subject import subject_models
+
+            models.update(zip(paths, subject_models([models[path] for path in paths])))
+    return models
+
+
+def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made:
+    if plan.error:
+        return Made(plan.recording, None, plan.error)
+    static, still = plan.static or (None, None)
+    try:
+        made = reconstruct(read(plan.recording.path), still, model, settings, progress, cancelled)
+    except Cancelled:
+        raise
+    except (BeyondMocapError, OSError) as error:
+        return Made(plan.recording, None, str(error), static)
+    return Made(plan.recording, made, static=static, note=plan.note)
+
+
+def _part_of(progress, number: int, count: int, name: str):
+    if progress is None:
+        return None
+    return lambda fraction, text="": progress((number + fraction) / count, f"{name}: {text}")

@@ -1,0 +1,262 @@
+"""The launch of a ball from a marker on its surface: release time, way and spin fitted together (eq. 6.2-6.4).
+
+Before the release the marker stands still in the hand's frame; after it, it goes round the centre of a ball that flies:
+
+    y(t) = p + v (t - t0) + g (t - t0)^2 / 2 + air + cos(w (t - t0)) a + sin(w (t - t0)) b
+
+which is eq. 6.3 with the turning marker written as the circle that it goes on (a, b: where it starts and where it is a
+quarter turn later; what it has along the spin's axis goes into p). For a given rate w it is linear in p, v, a and b, so
+that all release times, on both sides of the first guess, and all rates are tried at once. The paper searched before the
+guess alone, with the hand's velocity as the ball's: its throws came out 1.15 m/s too slow (§8.2.2). Here the flight
+says how fast the ball is, and the hand only when.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.time_series import interpolate
+from ...ball.physics import Ball, in_air
+
+FASTEST_SPIN = 2.0 * np.pi * 50.0
+"""rad/s: 3000 turns a minute, the most that pitched baseballs have."""
+_RATES = 60
+_LEAST = 2  # frames of flight
+_FIRST = 0.11  # s of flight with which release and spin are searched; the rest follows from there
+_MORE = (0.17, 0.25, 0.35)  # s of flight that are taken as long as the ball flies on
+_FURTHER = 0.03  # m by which a flight may be elsewhere a moment later, before air and turning are known
+_HELD = 0.12  # s before the release in which the marker stands still in the hand
+_HAND_SPEED = 0.2  # of the hand's speed, how uncertain it is as the ball's
+_NOISE = 0.0015  # m, of a marker
+_FAR = 5.0  # noise beyond which a marker counts less
+_FINE = 0.125  # frames, the last steps of the release time
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """What the hand says, T frames.
+
+    marker: (T, 3) m, where the ball's marker would be, were it held on and on. centre: (T, 3) m of the ball and
+    velocity: (T, 3) m/s, likewise. sigma: m, how sure the marker's place is.
+    """
+
+    marker: np.ndarray
+    centre: np.ndarray
+    velocity: np.ndarray
+    sigma: float = 0.006
+
+
+@dataclass(frozen=True, eq=False)
+class LaunchFit:
+    """How the ball left.
+
+    time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
+    told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
+    no ball is smaller. residual: m, root mean square of the marker in flight.
+    time_sigma: s and speed_sigma: m/s, one standard deviation each. frames: of flight that were seen. seconds: of
+    flight that were used.
+    """
+
+    time: float
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    offset: np.ndarray
+    circle: float
+    residual: float
+    time_sigma: float
+    speed_sigma: float
+    frames: int
+    seconds: float
+
+
+def fit_launch(
+    marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float, window: float = 0.12
+) -> LaunchFit | None:
+    """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
+
+    guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in
+    the air. None where the marker is not seen away from the hand in at least two frames.
+    """
+    search = _Search(marker, held, fps, ball, radius)
+    first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
+    tried = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
+    rates = np.arange(1, _RATES + 1) * (min(FASTEST_SPIN, 0.9 * np.pi * fps) / _RATES)
+    flights = [(flight, t) for t in tried if (flight := search.flight(t, t + _FIRST, rates)) is not None]
+    if not flights or not search.leaves(last):
+        return None
+    best, at = min(flights, key=lambda found: found[0].cost + search.further_on(*found))
+    best, at = search.refined(best, at, rates[1] - rates[0], _FIRST)
+    seconds = _FIRST
+    for longer in _MORE:
+        further, when = search.refined(best, at, 2.0 / longer, longer)
+        if further.frames == best.frames or further.residual > max(1.5 * best.residual, 2.0 * _NOISE):
+            break
+        best, at, seconds = further, when, longer
+    return search.told(best, at, seconds)
+
+
+@dataclass(eq=False)
+class _Flight:
+    """One solved flight: its cost with the held frames before it, velocity, place and circle (a, b) of eq. 6.3."""
+
+    cost: float
+    velocity: np.ndarray
+    place: np.ndarray
+    circle: tuple[np.ndarray, np.ndarray]
+    rate: float
+    residual: float
+    speed_sigma: float
+    frames: int
+
+
+class _Search:
+    """Flights for one throw; `air` is what drag and lift do to the marker, once a launch is known."""
+
+    def __init__(self, marker, held: Held, fps: float, ball: Ball, radius: float):
+        self.marker, self.held, self.fps, self.ball, self.radius = marker, held, fps, ball, radius
+        self.times = np.arange(len(marker)) / fps
+        self.seen = np.isfinite(marker).all(axis=-1)
+        self.air = np.zeros_like(marker)
+
+    def flight(self, t0: float, end: float, rates: np.ndarray) -> _Flight | None:
+        """The flight from `t0` up to `end` for the best of `rates` (R,) rad/s of spin; None without frames."""
+        used = self.seen & (self.times > t0) & (self.times <= end)
+        count = int(np.count_nonzero(used))
+        if count < _LEAST:
+            return None
+        tau = self.times[used] - t0
+        wanted = self.marker[used] - self.air[used]
+        wanted[:, 2] += 0.5 * self.ball.gravity * tau**2
+        basis = np.empty((len(rates), count, 4))
+        basis[..., 0], basis[..., 1] = 1.0, tau
+        basis[..., 2], basis[..., 3] = np.cos(rates[:, None] * tau), np.sin(rates[:, None] * tau)
+        known, values = self._known(t0)
+        basis, wanted = basis / _NOISE, wanted / _NOISE
+        normal = np.einsum("rni,rnj->rij", basis, basis) + np.einsum("ki,kj->ij", known, known)
+        right = np.einsum("rni,nc->ric", basis, wanted) + np.einsum("ki,kc->ic", known, values)
+        solved = np.linalg.solve(normal, right)
+        miss = np.sum((np.einsum("rni,ric->rnc", basis, solved) - wanted) ** 2, axis=-1)
+        prior = np.einsum("ki,ric->rkc", known, solved) - values
+        cost = _robust(miss).sum(axis=-1) + np.sum(prior**2, axis=(-1, -2))
+        k = int(np.argmin(cost))
+        excess = max(float(miss[k].sum()) / max(3 * count - 12, 1), 1.0)
+        sigma = float(np.sqrt(np.linalg.inv(normal[k])[1, 1] * excess))
+        residual = float(np.sqrt(miss[k].mean())) * _NOISE
+        place, velocity, a, b = solved[k]
+        total = float(cost[k]) + self._held_cost(t0)
+        return _Flight(total, velocity, place, (a, b), float(rates[k]), residual, sigma, count)
+
+    def leaves(self, last: float) -> bool:
+        """Whether the marker is seen away from where the hand would have it, up to a first flight after `last`."""
+        used = self.seen & (self.times <= last + _FIRST)
+        away = np.linalg.norm(self.marker[used] - self.held.marker[used], axis=-1)
+        return np.count_nonzero(away[-_LEAST:] > 3.0 * self.held.sigma) >= _LEAST
+
+    def further_on(self, flight: _Flight, t0: float) -> float:
+        """What it costs that the marker is elsewhere in the next stretch than where this flight would be: a hand that
+        hardly moves yet also looks like a flight, but does not fly on."""
+        end = t0 + _FIRST
+        used = self.seen & (self.times > end) & (self.times <= end + _FIRST)
+        tau = (self.times[used] - t0)[:, None]
+        course = flight.place + flight.velocity * tau - [0.0, 0.0, 0.5 * self.ball.gravity] * tau**2
+        away = np.sum((self.marker[used] - course) ** 2, axis=-1) / _FURTHER**2
+        return float(np.sum(_robust(away)))
+
+    def _known(self, t0: float) -> tuple[np.ndarray, np.ndarray]:
+        """What is known beforehand, as four rows: where the marker leaves, how fast the hand is, how large the circle
+        can be."""
+        there, velocity = _at(self.held.marker, self.fps, t0), _at(self.held.velocity, self.fps, t0)
+        hand = max(_HAND_SPEED * float(np.linalg.norm(velocity)), 1.0)
+        sure = 1.0 / self.held.sigma
+        known = np.diag([sure, 1.0 / hand, 1.0 / self.radius, 1.0 / self.radius])
+        known[0, 2] = sure
+        return known, np.stack([there * sure, velocity / hand, np.zeros(3), np.zeros(3)])
+
+    def _held_cost(self, t0: float) -> float:
+        """What it costs that the marker is not where the hand would have it, up to `t0`."""
+        used = self.seen & (self.times > t0 - _HELD) & (self.times <= t0)
+        away = np.sum((self.marker[used] - self.held.marker[used]) ** 2, axis=-1) / (0.5 * self.held.sigma) ** 2
+        return float(np.sum(_robust(away)))
+
+    def refined(self, flight: _Flight, t0: float, width: float, seconds: float) -> tuple[_Flight, float]:
+        """The flight with `seconds` of samples, its spin's rate and release time between those tried, and the air that
+        it meets; and its release time."""
+        end = t0 + seconds
+        for turn in range(4):
+            self.air = self._air_of(flight, t0)
+            rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
+            flight = self.flight(t0, end, rates) or flight
+            width = max(width / 5.0, 0.05)
+            step = (1.0, 0.5, 0.25, _FINE)[turn] / self.fps
+            tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
+            flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
+        return flight, t0
+
+    def _air_of(self, flight: _Flight, t0: float) -> np.ndarray:
+        spin, _, _ = self._turning(flight, t0)
+        return _air(self.times, t0, flight.velocity, spin, self.ball)
+
+    def _turning(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Spin (3,) rad/s, offset (3,) m of the marker from the centre, and the centre (3,) m, at the release.
+
+        The circle's own plane gives the axis; what the marker has along it has two signs, of which the one is taken
+        that puts the centre nearer to where the hand has it.
+        """
+        a, b = flight.circle
+        there, usual, radius = flight.place + a, _at(self.held.centre, self.fps, t0), self.radius
+        axis = np.cross(a, b)
+        size = float(np.linalg.norm(axis))
+        if size < (0.2 * radius) ** 2 or flight.frames < 5:
+            toward = there - usual
+            offset = toward * (radius / max(float(np.linalg.norm(toward)), 1e-9))
+            return np.zeros(3), offset, there - offset
+        axis = axis / size
+        along = np.sqrt(max(radius**2 - float(a @ a), 0.0)) * axis
+        offset = min((a + along, a - along), key=lambda o: float(np.linalg.norm(there - o - usual)))
+        return axis * flight.rate, offset, there - offset
+
+    def told(self, flight: _Flight, t0: float, seconds: float) -> LaunchFit:
+        """The launch in its final form, with how uncertain its time is: as far as the cost grows by one."""
+        rate, end = np.array([flight.rate]), t0 + seconds
+        sides = []
+        for sign in (-1.0, 1.0):
+            shifts = sign * np.arange(1, 41) * _FINE / self.fps
+            worse = [f is None or f.cost > flight.cost + 1.0 for f in (self.flight(t0 + s, end, rate) for s in shifts)]
+            sides.append(abs(shifts[worse.index(True)]) if True in worse else abs(shifts[-1]))
+        spin, offset, centre = self._turning(flight, t0)
+        sigma = float(np.hypot(np.mean(sides), 0.2 / self.fps))
+        return LaunchFit(
+            float(t0), centre, flight.velocity, spin, offset, float(np.linalg.norm(flight.circle[0])), flight.residual,
+            sigma, flight.speed_sigma, flight.frames, seconds,
+        )  # fmt: skip
+
+
+def _robust(squares: np.ndarray) -> np.ndarray:
+    """Squared misses, in noise, of which single large ones count less."""
+    limit = _FAR**2
+    return np.where(squares < limit, squares, limit * (1.0 + np.log(np.maximum(squares, limit) / limit)))
+
+
+def _at(values: np.ndarray, fps: float, t: float) -> np.ndarray:
+    """(3,): values (T, 3) at one time, by the parabola through the three frames nearest to it."""
+    k = int(np.clip(round(t * fps), 1, len(values) - 2))
+    x = t * fps - k
+    low, mid, high = values[k - 1], values[k], values[k + 1]
+    return mid + 0.5 * x * (high - low) + 0.5 * x * x * (high - 2.0 * mid + low)
+
+
+def _air(times: np.ndarray, t0: float, velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
+    """(T, 3) m by which the air moves a ball off the parabola, launched at `t0` with `velocity` (3,) and `spin`."""
+    step = 0.002
+    count = int(min(max(times[-1] - t0, step), 2.0 * _MORE[-1]) / step) + 2
+    v, off, drift = np.array(velocity, float), np.zeros((count, 3)), np.zeros(3)
+    for k in range(1, count):
+        push = in_air(v[None], spin[None], ball)[0]
+        extra = push + [0.0, 0.0, ball.gravity]
+        off[k] = off[k - 1] + drift * step + 0.5 * extra * step**2
+        drift, v = drift + extra * step, v + push * step
+    at = np.clip(times - t0, 0.0, (count - 1) * step)
+    return interpolate(at, np.arange(count) * step, off)

@@ -1,0 +1,373 @@
+"""The recipe: when and how a ball left the hand of a recorded throw (Fredriksson ch. 6).
+
+`release(trial, motion)` takes the markers and the motion that was solved from them. Where a marker sits on the ball and
+is seen in flight, time, way and spin are fitted to it; else the hand tells, less surely. Neither looks at the speed
+that the file's name may give: that stands beside the result, for comparison.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...ball.flight import Launch, fly
+from ...ball.physics import THROWN, Ball
+from ...base.settings import setting
+from .carry import carried_and_thrown
+from .first_guess import by_distance, fastest, speeds
+from ...motion.hand import Hand, hand_of
+from .hand_markers import sharpened
+from .hand_ball import HandBall, ball_in_hand
+from ...motion.hand import usual_centre
+from .launch_fit import Held, fit_launch
+from .radar import radar_speed
+from .without_ball import HOLD, release_by_hand
+from ...base.errors import InputError
+from ..frame_times import evenly
+from ..trial import MarkerTrial
+from ...motion.contacts import ground_height
+from ...motion.humanoid import identify
+from ...motion.motion import Motion, forward_kinematics, resample
+from ...motion.track.ball_path import BallPath
+
+FEWEST = 12
+"""Frames without which no throw is looked for."""
+SLOWEST = 1.5
+"""m/s: a hand that is never faster throws nothing."""
+_BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
+_HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
+_NEARBY = 0.3  # s before a hand is fastest: the ball is in it
+_TELLS, _LARGER = 10, 1.25  # frames of flight that tell a circle, and radii beyond which it is another ball's
+_AIR = 0.25  # of what the air makes, how uncertain it is
+_REACHES = 0.35  # m from the palm, within which a marker may be on a ball that the hand holds
+_BESIDE = 1.5  # m, between the middle of the markers and that of the joints
+_LONGEST = 8.0  # s of flight until the ground
+_SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
+
+
+@dataclass(frozen=True)
+class ReleaseSettings:
+    """What is known beforehand.
+
+    ball_marker: label, None to find one named as a ball, "" for none. radius: m, None for the kind's, or fitted where
+    the markers tell it. hand: "left", "right" or None for the one that throws. ball: one of `THROWN`. window: s about
+    the first guess that are searched. centre: (3,) m, the ball's centre in the hand's frame where other throws told it.
+    """
+
+    ball_marker: str | None = None
+    radius: float | None = None
+    hand: str | None = None
+    ball: str = setting("release", "ball").default
+    window: float = 0.12
+    centre: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Release:
+    """How the ball left.
+
+    time: s from the trial's first frame. frame: the nearest one. position (3,) m and velocity (3,) m/s of its centre,
+    spin (3,) rad/s, zero where nothing tells it. time_sigma: s, speed_sigma: m/s and way_sigma: rad of the direction,
+    one standard deviation each. side: of the hand. how: "ball" where its marker told, "hand" where only the hand did.
+    residual: m of its marker in flight, NaN without. flight_frames: in which it was seen to fly. radar: m/s that the
+    file's name tells, or None. centre: (3,) m in the hand's frame, radius: m. path: the ball in all frames. impact:
+    (3,) m, where it first meets the ground, or None. hips: (3,) m in the first frame. notes: lines for people. All
+    places are in the motion's space, over its own floor; markers may be shifted from it.
+    """
+
+    time: float
+    frame: int
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    time_sigma: float
+    speed_sigma: float
+    way_sigma: float
+    side: str
+    how: str
+    residual: float
+    flight_frames: int
+    radar: float | None
+    centre: np.ndarray
+    radius: float
+    path: BallPath
+    impact: np.ndarray | None
+    hips: np.ndarray
+    notes: tuple[str, ...] = ()
+
+    @property
+    def speed(self) -> float:
+        """m/s at the release."""
+        return float(np.linalg.norm(self.velocity))
+
+    @property
+    def direction(self) -> np.ndarray:
+        """Unit (3,)."""
+        return self.velocity / max(self.speed, 1e-9)
+
+    def report(self) -> dict:
+        """The figures, for JSON."""
+        return {
+            "release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
+            "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
+            "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
+            "radar_speed_m_s": self.radar,
+            "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
+            "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side, "how": self.how,
+            "residual_m": None if np.isnan(self.residual) else self.residual, "flight_frames": self.flight_frames,
+            "impact_m": None if self.impact is None else self.impact.tolist(), "hips_m": self.hips.tolist(),
+            "ball_radius_m": self.radius, "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes),
+        }  # fmt: skip
+
+
+def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
+    """When and how the ball left the hand.
+
+    motion: solved from the trial, frame for frame, or at another rate over the same time. InputError: a motion of
+    another length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known.
+    """
+    ball = THROWN.get(settings.ball)
+    if ball is None:
+        raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
+    motion = _frame_for_frame(trial, motion)
+    if len(trial) < FEWEST:
+        raise InputError(trial.name, f"{len(trial)} frames", f"at least {FEWEST}", "take a longer stretch")
+    even = evenly(trial)
+    _check_near(even, motion)
+    label = _ball_label(even, settings.ball_marker)
+    marker = None if label is None else even.positions[:, even.index(label)]
+    sides = (settings.hand,) if settings.hand else ("left", "right")
+    hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
+    hand = _throwing(hands, marker)
+    _check_throws(hand, even.name)
+    lies, notes = _in_hand(hand, marker, settings, ball)
+    notes += even.notes[len(trial.notes) :]
+    found = None
+    if marker is not None:
+        found = _by_ball(hand, marker, lies, ball, settings, notes)
+        found = _believed(found, hand, marker, label, lies.radius, settings, even.name, notes)
+    found = found or _by_hand(hand, motion, lies, ball, notes)
+    seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
+    return _result(found, hand, motion, lies, seen, even.name, notes)
+
+
+def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
+    """What the marker told, None where it was on no ball in this hand. InputError where the user said that it was."""
+    away = _away(hand, marker, found)
+    if away <= _REACHES:
+        if found is None:
+            notes.append(f"{label} is not seen in flight: the hand alone tells of the release")
+        elif found.frames >= _TELLS and found.circle > _LARGER * radius:
+            notes.append(
+                f"{label} goes round {1000.0 * found.circle:.0f} mm from the ball's centre, and a {settings.ball} is "
+                "smaller: say its radius or kind"
+            )
+        return found
+    said = f"{label} is {away:.2f} m from the {hand.side} hand"
+    if settings.ball_marker or settings.hand:
+        raise InputError(name, said, "a marker on the ball in that hand", "check the marker and the hand")
+    notes.append(f"{said}: the hand alone tells of the release")
+    return None
+
+
+def _check_throws(hand: Hand, name: str) -> None:
+    """InputError where the hand is never fast enough to throw."""
+    pace = float(np.max(_steady(hand)))
+    if pace < SLOWEST:
+        raise InputError(
+            name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or the other hand"
+        )
+
+
+def _check_near(trial: MarkerTrial, motion: Motion) -> None:
+    """InputError where the markers are elsewhere than the motion's body."""
+    places, _ = forward_kinematics(motion)
+    often = trial.seen.mean(axis=0) > 0.5
+    markers = trial.positions[:, often]
+    if not often.any():
+        return
+    away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
+    if away > _BESIDE:
+        raise InputError(
+            trial.name, f"markers {away:.1f} m beside the motion", "the motion that was made from this trial",
+            "reconstruct the trial first",
+        )  # fmt: skip
+
+
+def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
+    """m from the hand to the ball's marker: while it is held where it is seen then, else to where the flight begins."""
+    held = _held_frames(hand, marker)
+    palm = hand.carried(HOLD * hand.reach * hand.finger)
+    if held.sum() >= 3:
+        return float(np.median(np.linalg.norm(marker[held] - palm[held], axis=-1)))
+    if found is None:
+        return 0.0
+    k = int(np.clip(round(found.launch.time * hand.fps), 0, len(hand) - 1))
+    return float(np.linalg.norm(found.launch.position - palm[k]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """A launch, in the markers' space, and how sure it is."""
+
+    launch: Launch
+    ball: Ball
+    how: str
+    time_sigma: float
+    speed_sigma: float
+    way_sigma: float
+    residual: float = float("nan")
+    frames: int = 0
+    circle: float = 0.0
+
+
+def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, name: str, notes) -> Release:
+    """The launch in the motion's space, with all that follows from it."""
+    launch = replace(found.launch, position=found.launch.position - hand.shift)
+    home = replace(hand, origin=hand.origin - hand.shift)
+    ground = ground_height(motion)
+    places = carried_and_thrown(home, lies.centre, launch, found.ball, ground)
+    way = fly(launch, found.ball, _LONGEST, ground)
+    impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
+    hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
+    return Release(
+        launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,
+        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, found.way_sigma, hand.side,
+        found.how, found.residual, found.frames, radar_speed(name), lies.centre, lies.radius,
+        BallPath(hand.times, places, seen), impact, hips, tuple(notes),
+    )  # fmt: skip
+
+
+def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
+    if len(motion) == len(trial):
+        return Motion(motion.skeleton, motion.root_positions, motion.rotations, trial.fps)
+    if abs(motion.fps - trial.fps) > 0.01 * trial.fps:
+        other = resample(motion, trial.fps)
+        if abs(len(other) - len(trial)) <= max(2.0 * trial.fps / motion.fps, 2.0):
+            return _as_long(other, len(trial))
+    raise InputError(
+        trial.name, f"{len(trial)} frames at {trial.fps:g} per second, and a motion of {len(motion)} at {motion.fps:g}",
+        "the motion that was made from this trial", "reconstruct the trial first",
+    )  # fmt: skip
+
+
+def _as_long(motion: Motion, count: int) -> Motion:
+    at = np.minimum(np.arange(count), len(motion) - 1)
+    return Motion(motion.skeleton, motion.root_positions[at], motion.rotations[at], motion.fps)
+
+
+def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
+    """The ball's marker: the one asked for, else the most often seen that is named as a ball."""
+    if asked:
+        trial.index(asked)
+        return asked
+    named = [label for label in trial.labels if _BALL_LABEL.match(label)]
+    if asked == "" or not named:
+        return None
+    return max(named, key=lambda label: np.count_nonzero(trial.seen[:, trial.index(label)]))
+
+
+def _ball_labels(trial: MarkerTrial, label: str | None) -> tuple[str, ...]:
+    return tuple(name for name in trial.labels if name == label or _BALL_LABEL.match(name))
+
+
+def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
+    """The hand in which the ball's marker is before it flies; without a marker the faster one."""
+    peaks = [fastest(hand.origin, hand.fps) for hand in hands]
+    fast = max(range(len(hands)), key=lambda i: speeds(hands[i].origin, hands[i].fps)[peaks[i]])
+    if marker is None or len(hands) == 1:
+        return hands[fast]
+    nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
+    return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _REACHES else hands[fast]
+
+
+def _steady(hand: Hand) -> np.ndarray:
+    """(T,) m/s, of which single frames that are off are taken out."""
+    from scipy.signal import medfilt
+
+    return medfilt(speeds(hand.origin, hand.fps), 5)
+
+
+def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
+    """m between hand and marker shortly before the hand is fastest; infinite where it is hardly seen then."""
+    away = np.linalg.norm(marker - hand.carried(HOLD * hand.reach * hand.finger), axis=-1)
+    away = away[max(peak - int(_NEARBY * hand.fps), 0) : peak + 1]
+    away = away[np.isfinite(away)]
+    return float(np.median(away)) if len(away) >= 3 else np.inf
+
+
+def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
+    """Where the ball lies in the hand, and what is to be told of it."""
+    usual = usual_centre(hand.finger, hand.reach, _palm(hand))
+    radius = settings.radius or ball.radius
+    if settings.centre is not None:
+        return HandBall(np.array(settings.centre, float), radius, 0.005), []
+    if marker is None:
+        return HandBall(usual, radius, 0.03), []
+    held = _held_frames(hand, marker)
+    lies = ball_in_hand(hand.taken_back(marker)[held], radius, usual, fit_radius=settings.radius is None)
+    told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm by its marker"] if lies.fitted else []
+    return lies, told
+
+
+def _palm(hand: Hand) -> np.ndarray | None:
+    """Out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise."""
+    return np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
+
+
+def _held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
+    """(T,) bool: shortly before the first guess, where the marker is seen."""
+    last = _guess(hand, marker)
+    times = hand.times
+    return np.isfinite(marker).all(axis=-1) & (times > last - _HELD[0]) & (times < last - _HELD[1])
+
+
+def _guess(hand: Hand, marker: np.ndarray) -> float:
+    knuckles = hand.carried(HOLD * hand.reach * hand.finger)
+    frame = by_distance(knuckles, marker, hand.fps)
+    return (fastest(knuckles, hand.fps) if frame is None else frame) / hand.fps
+
+
+def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSettings, notes) -> _Found | None:
+    """By the marker on the ball; None where it is not seen to fly."""
+    held = _held_frames(hand, marker)
+    sure = bool(held.sum() >= 3)
+    place = np.nanmedian(hand.taken_back(marker)[held], axis=0) if sure else lies.centre
+    centre = hand.carried(lies.centre)
+    velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
+    course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
+    guess = _guess(hand, marker)
+    fits = [(fit_launch(marker, course, hand.fps, guess, air, lies.radius, settings.window), air)
+            for air in (ball, _without_air(ball))]
+    if fits[0][0] is None or fits[1][0] is None:
+        return None
+    fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
+    if not sure:
+        notes.append("the ball's marker is not seen in the hand: the release is where the flight meets the hand")
+    launch = Launch(fit.time, fit.position, fit.velocity, fit.spin)
+    air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
+    speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
+    way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
+    return _Found(launch, ball, "ball", fit.time_sigma, speed_sigma, way_sigma, fit.residual, fit.frames, fit.circle)
+
+
+def _without_air(ball: Ball) -> Ball:
+    """As eq. 6.2 has it; which of both is nearer to what was seen is taken."""
+    return replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
+
+
+def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:
+    found = release_by_hand(hand, lies.radius, _stride(motion))
+    if not hand.markers:
+        notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
+    launch = Launch(found.time, found.position, found.velocity)
+    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma, found.way_sigma)
+
+
+def _stride(motion: Motion) -> np.ndarray:
+    """(T, 2) m, level: from one foot to the other."""
+    body = identify(motion.skeleton)
+    places, _ = forward_kinematics(motion)
+    return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]

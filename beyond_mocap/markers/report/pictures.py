@@ -1,0 +1,166 @@
+"""The pictures of a folder of trials, each a PNG as bytes (Fredriksson figs. 8.1 to 8.4); matplotlib inside functions.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...evaluation.plots import plain
+from .impacts import dominant_sides
+from .results import TrialResult
+
+DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
+_WIDTH, _DPI = 11.0, 100
+_BINS = 24
+
+
+def residuals_and_time(results: Sequence[TrialResult]) -> bytes:
+    """Fig. 8.1: weighted squared residuals a frame, and milliseconds a frame, by subject; bars end one standard
+    deviation up and down."""
+    made = [result for result in results if not result.error]
+    subjects = sorted({result.subject for result in made})
+    figure, (left, right) = _canvas(1, 2, 3.6)
+    squares = [_over_frames([r for r in made if r.subject == subject]) for subject in subjects]
+    times = [[1000.0 / r.rate for r in made if r.subject == subject and r.rate > 0] for subject in subjects]
+    names = [subject or "no name" for subject in subjects]
+    _bar(left, names, [1e4 * mean for mean, _ in squares], [1e4 * sd for _, sd in squares])
+    left.set_ylabel("cm², sum over markers")
+    left.set_title("squared residuals a frame, weighted", loc="left", fontsize=9.5)
+    _bar(right, names, [np.mean(t) if t else np.nan for t in times], [np.std(t) if t else 0.0 for t in times])
+    right.set_ylabel("ms")
+    right.set_title("time a frame of the pose", loc="left", fontsize=9.5)
+    return _png(figure)
+
+
+def residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
+    """Root mean square residuals of every trial, beside what fitting each segment alone leaves."""
+    made = [result for result in results if not result.error]
+    figure, (ax,) = _canvas(1, 1, 0.9 + 0.28 * len(made))
+    rows = np.arange(len(made))
+    ax.barh(rows - 0.19, [r.residual for r in made], 0.36, color=DOMINANT, label="whole body")
+    ax.barh(rows + 0.19, [r.single for r in made], 0.36, color=QUIET, label="segments alone")
+    ax.set_yticks(rows, [_short(r.name) for r in made])
+    ax.invert_yaxis()
+    ax.set_xlabel("mm, root mean square", fontsize=8)
+    ax.set_title("markers against the model", loc="left", fontsize=9.5)
+    ax.legend(fontsize=8, frameon=False)
+    return _png(figure)
+
+
+def impact_map(points: np.ndarray) -> bytes:
+    """Fig. 8.2: how many throws land where, points (N, 2) m as `aligned_impacts` gives them, and their margins."""
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MaxNLocator
+
+    figure = Figure(figsize=(8.0, 7.0), dpi=_DPI, layout="constrained")
+    grid = figure.add_gridspec(2, 2, width_ratios=(4, 1), height_ratios=(1, 4))
+    main = figure.add_subplot(grid[1, 0])
+    above, beside = figure.add_subplot(grid[0, 0], sharex=main), figure.add_subplot(grid[1, 1], sharey=main)
+    edges = [_edges(points[:, axis]) for axis in (0, 1)]
+    counts, *_ = np.histogram2d(points[:, 0], points[:, 1], bins=edges)
+    shown = main.pcolormesh(*edges, np.where(counts > 0, counts, np.nan).T, cmap="viridis", vmin=0)
+    bar = figure.colorbar(shown, ax=beside, label="throws", ticks=MaxNLocator(integer=True))
+    bar.ax.tick_params(labelsize=8)
+    above.hist(points[:, 0], bins=edges[0], color=DOMINANT)
+    beside.hist(points[:, 1], bins=edges[1], color=DOMINANT, orientation="horizontal")
+    above.tick_params(labelbottom=False, labelsize=8)
+    beside.tick_params(labelleft=False, labelsize=8)
+    _ground(main)
+    return _png(figure)
+
+
+def impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
+    """Fig. 8.3: where each subject's throws land, by dominant and other arm."""
+    sides = dominant_sides(results)
+    figure, axes = _canvas((len(sides) + 2) // 3, min(len(sides), 3), 3.6)
+    for ax, (subject, strong) in zip(axes, sorted(sides.items())):
+        for name, colour, wanted in (("dominant arm", DOMINANT, True), ("other arm", OTHER, False)):
+            rows = [i for i, r in enumerate(results) if r.subject == subject and r.throw is not None
+                    and (r.throw.side == strong) is wanted and np.isfinite(points[i]).all()]
+            if rows:
+                ax.plot(*points[rows].T, "o", color=colour, ms=4, label=f"{name}: {len(rows)}")
+        ax.set_title(subject or "no name", loc="left", fontsize=9.5)
+        _ground(ax)
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(fontsize=8, frameon=False)
+    for ax in axes[len(sides):]:
+        ax.axis("off")
+    return _png(figure)
+
+
+def speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
+    """Fig. 8.4: how speeds (N,) m/s are spread, measured and estimated, and pair by pair."""
+    figure, (left, right) = _canvas(1, 2, 3.8)
+    edges = _edges(np.concatenate([measured, estimated]), 16)
+    for values, colour, name in ((measured, QUIET, "measured"), (estimated, DOMINANT, "estimated")):
+        share = np.full(len(values), 1.0 / len(values))
+        left.hist(values, bins=edges, weights=share, color=colour, alpha=0.6, label=name)
+    left.set_xlabel("m/s", fontsize=8)
+    left.set_ylabel("share of throws")
+    left.set_title("ball speeds", loc="left", fontsize=9.5)
+    left.legend(fontsize=8, frameon=False)
+    span = np.array([edges[0], edges[-1]])
+    right.plot(span, span, color=QUIET, lw=1)
+    right.fill_between(span, 0.9 * span, 1.1 * span, color=QUIET, alpha=0.15, lw=0, label="within 10 %")
+    right.plot(measured, estimated, "o", color=DOMINANT, ms=4)
+    right.set_xlabel("measured, m/s", fontsize=8)
+    right.set_ylabel("estimated, m/s")
+    right.set_title("pair by pair", loc="left", fontsize=9.5)
+    right.legend(fontsize=8, frameon=False)
+    return _png(figure)
+
+
+def _over_frames(made: Sequence[TrialResult]) -> tuple[float, float]:
+    """Mean and standard deviation over all frames of several trials."""
+    count = np.array([r.frames for r in made], float)
+    mean, spread = np.array([r.squares for r in made], float).reshape(-1, 2).T
+    known = np.isfinite(mean) & np.isfinite(spread) & (count > 0)
+    if not known.any():
+        return np.nan, 0.0
+    share = count[known] / count[known].sum()
+    whole = float(share @ mean[known])
+    return whole, float(np.sqrt(max(share @ (spread[known] ** 2 + mean[known] ** 2) - whole**2, 0.0)))
+
+
+def _bar(ax, names, values, spread) -> None:
+    ax.bar(range(len(names)), values, 0.6, yerr=spread, color=DOMINANT, ecolor="#333333", capsize=4)
+    ax.set_xticks(range(len(names)), [_short(name) for name in names])
+    ax.set_ylim(bottom=0.0)
+
+
+def _ground(ax) -> None:
+    ax.set_xlabel("m to the right of the throw", fontsize=8)
+    ax.set_ylabel("m from the hips", fontsize=8)
+    ax.tick_params(labelsize=8)
+    ax.plot(0.0, 0.0, "+", color="#c0392b", ms=9)
+    ax.grid(color="#e6e6e6", lw=0.6)
+    ax.set_axisbelow(True)
+
+
+def _edges(values: np.ndarray, bins: int = _BINS) -> np.ndarray:
+    low, high = float(np.min(values)), float(np.max(values))
+    room = max(0.05 * (high - low), 0.25)
+    return np.linspace(low - room, high + room, bins + 1)
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 34 else name[:15] + " … " + name[-15:]
+
+
+def _canvas(rows: int, columns: int, height: float):
+    """A figure without a window, and its axes row by row."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_WIDTH, height * rows), dpi=_DPI, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    plain(axes)
+    return figure, axes
+
+
+def _png(figure) -> bytes:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()

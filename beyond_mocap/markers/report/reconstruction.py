@@ -1,0 +1,97 @@
+"""The figures of a motion that was reconstructed from markers: how near its markers are, how its feet stand, what was
+mended."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.errors import InputError
+from ..pose.residuals import residuals
+from ...motion import contacts as foot_contacts
+from ...motion.humanoid import identify
+from ...motion.motion import Motion, forward_kinematics
+from ...synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
+
+
+def figures(made) -> dict:
+    """The report of a `reconstruct.Reconstruction`, for JSON; lengths of markers in millimetres, see the keys."""
+    solved, motion = made.solved, made.motion
+    posing = made.seconds.get("pose") or solved.seconds
+    return {
+        "trial": made.raw.name, "subject": made.model.subject, "marker_set": made.model.set_name,
+        "markers": len(made.model.markers), "joints": len(made.model.skeleton), "fps": motion.fps,
+        "frames": len(motion), "duration_s": motion.duration, "seconds": dict(made.seconds),
+        "residual_mm": residual_figures(made), "weighted_se": weighted_squares(solved),
+        "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": bones_change(motion),
+        "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor,
+        "grounded": made.grounded,
+        "held_share": None if made.held is None else float(made.held.any(axis=(1, 2)).mean()),
+        **made.cleaned.report.as_dict(), "release": None if made.release is None else made.release.report(),
+        "warnings": list(made.warnings),
+    }  # fmt: skip
+
+
+def residual_figures(made) -> dict:
+    """Millimetres between the model's markers and those seen: of the pose, beside what fitting every segment alone
+    leaves (`single_mean`), and of the motion that is written, after its filters (`output_mean`)."""
+    seen = 1000.0 * made.solved.residual[np.isfinite(made.solved.residual)]
+    single = 1000.0 * made.solved.single[np.isfinite(made.solved.single)]
+    written = 1000.0 * residuals(made.model, made.motion, made.trial)
+    each = {label: _mean(1000.0 * made.solved.residual[:, i]) for i, label in enumerate(made.model.markers)}
+    return {
+        "mean": _mean(seen), "rms": _rms(seen), "p95": _percentile(seen, 95), "max": _percentile(seen, 100),
+        "single_mean": _mean(single), "single_rms": _rms(single), "output_mean": _mean(written),
+        "output_rms": _rms(written), "per_marker": each,
+    }  # fmt: skip
+
+
+def weighted_squares(solved) -> dict:
+    """The sum over markers of weight x residual^2 a frame, m^2 (Fredriksson §5.3.2 eq. 5.1): mean and deviation."""
+    each = np.nansum(solved.weights * solved.residual**2, axis=1)
+    return {"mean": float(each.mean()), "sd": float(each.std())} if len(each) else {"mean": None, "sd": None}
+
+
+def bones_change(motion: Motion) -> float:
+    """The largest difference in metres between a bone's length in any frame and in the skeleton."""
+    places, _ = forward_kinematics(motion)
+    parents = np.array(motion.skeleton.parents[1:], dtype=int)
+    lengths = np.linalg.norm(places[:, 1:] - places[:, parents], axis=-1)
+    return float(np.abs(lengths - np.linalg.norm(motion.skeleton.offsets[1:], axis=-1)).max(initial=0.0))
+
+
+def skate(motion: Motion) -> dict | None:
+    """Speed of standing feet and travel of their toes in a stance; None for a body without legs or a slow recording."""
+    try:
+        identify(motion.skeleton)
+    except InputError:
+        return None
+    if len(motion) < 3:
+        return None
+    standing = foot_contacts.detect(motion)
+    places, _ = forward_kinematics(motion)
+    feet = places[:, foot_joints(motion.skeleton)]
+    travel = 1000.0 * stance_travel(feet[:, :, 1], stances(standing))
+    return {
+        "contact_cm_s": _mean(100.0 * contact_speeds(feet, standing, motion.fps)),
+        "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel),
+    }  # fmt: skip
+
+
+def limit_shares(solved, names) -> dict[str, float]:
+    """Joint -> share of the frames in which it is at a limit, for those that are at all."""
+    share = np.asarray(solved.at_limit, dtype=bool).mean(axis=0)
+    return {name: float(part) for name, part in zip(names, share) if part > 0}
+
+
+def _mean(values: np.ndarray) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(values.mean()) if len(values) else None
+
+
+def _rms(values: np.ndarray) -> float | None:
+    values = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def _percentile(values: np.ndarray, share: float) -> float | None:
+    return float(np.percentile(values, share)) if len(values) else None

@@ -1,0 +1,179 @@
+"""A body as capsules along its skeleton, and how deep two bodies are in each other.
+
+A capsule is all that lies within its radius of a straight line. The overlap of two bodies is the largest, over all
+pairs of a capsule of the one and a capsule of the other, of the sum of both radii less the distance of both lines;
+negative where they are apart. The radii are those of the low-poly body (`appearance.body`), the wide trunk as three lines
+(across the hips, up the spine, across the shoulders).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import lru_cache
+
+import numpy as np
+
+from ...motion.humanoid import identify, stature
+from ...motion.motion import Motion, forward_kinematics
+from ...motion.skeleton import Skeleton
+
+HEAD = 0.10, 0.095
+"""Metres, at a stature of 1.80 m, from the head's joint to the end of its line, and its radius."""
+
+HAND = 0.09
+"""Metres by which the forearm's line goes on into the hand."""
+
+RADII = {
+    "hips": 0.10, "spine": 0.12, "shoulders": 0.075, "upper_arm": 0.055, "lower_arm": 0.042,
+    "upper_leg": 0.085, "lower_leg": 0.052, "foot": 0.042,
+}
+"""Metres at a stature of 1.80 m."""
+
+FAR = 2.5
+"""Metres between the middles of two bodies' hips from which on they cannot touch."""
+
+_TALL = 1.80  # m, the body for which radii are given
+
+
+@dataclass(frozen=True)
+class Capsule:
+    """One part: its line runs from joint `start` to joint `end` and `beyond` metres further; radius in metres. limb:
+    "arm", "leg" or "" for trunk and head; side: 0 left, 1 right; along: how far its start and its end are down a leg,
+    0 at the hip and 1 at the ankle."""
+
+    start: int
+    end: int
+    radius: float
+    beyond: float = 0.0
+    limb: str = ""
+    side: int = 0
+    along: tuple[float, float] = (0.0, 0.0)
+
+
+def capsules(skeleton: Skeleton) -> tuple[Capsule, ...]:
+    """The parts of a body; InputError where the skeleton has no legs."""
+    return _capsules(_Same(skeleton))
+
+
+class _Same:
+    """A skeleton that is known again by its fingerprint."""
+
+    def __init__(self, skeleton: Skeleton):
+        self.skeleton, self.key = skeleton, skeleton.fingerprint
+
+    def __hash__(self):
+        return hash(self.key)
+
+    def __eq__(self, other):
+        return self.key == other.key
+
+
+@lru_cache(maxsize=64)
+def _capsules(same: _Same) -> tuple[Capsule, ...]:
+    body, size = identify(same.skeleton), stature(same.skeleton) / _TALL
+    radius = {part: size * value for part, value in RADII.items()}
+    top = body.neck_or_chest
+    found = [Capsule(body.left.upper_leg, body.right.upper_leg, radius["hips"])]
+    if top != body.hips:
+        found.append(Capsule(body.hips, top, radius["spine"]))
+    if body.head is not None and top != body.head:
+        found.append(Capsule(top, body.head, size * HEAD[1], size * HEAD[0]))
+    if body.left.upper_arm is not None and body.right.upper_arm is not None:
+        found.append(Capsule(body.left.upper_arm, body.right.upper_arm, radius["shoulders"]))
+    for side, limb in enumerate((body.left, body.right)):
+        if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
+            found.append(Capsule(limb.upper_arm, limb.lower_arm, radius["upper_arm"], 0.0, "arm", side))
+            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND, "arm", side))
+        found.append(Capsule(limb.upper_leg, limb.lower_leg, radius["upper_leg"], 0.0, "leg", side, (0.0, 0.5)))
+        found.append(Capsule(limb.lower_leg, limb.foot, radius["lower_leg"], 0.0, "leg", side, (0.5, 1.0)))
+        if limb.toe is not None:
+            found.append(Capsule(limb.foot, limb.toe, radius["foot"], 0.0, "leg", side, (1.0, 1.0)))
+    return tuple(found)
+
+
+def lines(motion: Motion) -> np.ndarray:
+    """(T, C, 2, 3) m: both ends of every capsule's line in the world."""
+    return lines_of(capsules(motion.skeleton), forward_kinematics(motion)[0])
+
+
+def lines_of(parts: tuple[Capsule, ...], places: np.ndarray) -> np.ndarray:
+    """The same from joints' places (T, J, 3) m."""
+    start, end = (places[:, [getattr(part, name) for part in parts]] for name in ("start", "end"))
+    way = end - start
+    length = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
+    return np.stack([start, end + way / length * np.array([part.beyond for part in parts])[:, None]], axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """Pairs of capsules (K,) that are in each other or nearly so: frame (K,); one, other (K,) numbers of the capsules;
+    depth (K,) m; radii (K,) m, the sum of both; away (K, 3) unit vector from the other to the one; at_one, at_other
+    (K,) share of the way along either line where they are nearest."""
+
+    frame: np.ndarray
+    one: np.ndarray
+    other: np.ndarray
+    depth: np.ndarray
+    radii: np.ndarray
+    away: np.ndarray
+    at_one: np.ndarray
+    at_other: np.ndarray
+
+    def rows(self, kept: np.ndarray) -> Touching:
+        """Some of them, by their numbers."""
+        return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
+
+
+def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.ndarray], least: float = 0.0) -> Touching:
+    """Where two bodies' capsules are at least `least` metres deep in each other.
+
+    one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m.
+    """
+    off = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
+    near = np.flatnonzero(np.einsum("tk,tk->t", off, off) < (2.0 * FAR) ** 2)
+    frame, a, b = np.nonzero(_balls_meet(one[near], other[near], radii[0][:, None] + radii[1] - least))
+    frame = near[frame]
+    off, at_a, at_b = nearest(one[frame, a], other[frame, b])
+    far = np.linalg.norm(off, axis=1)
+    both = radii[0][a] + radii[1][b]
+    depth = both - far
+    keep = np.flatnonzero(depth >= least)
+    away = off[keep] / np.maximum(far[keep], 1e-9)[:, None]
+    return Touching(frame[keep], a[keep], b[keep], depth[keep], both[keep], away, at_a[keep], at_b[keep])
+
+
+def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """(T, C, D) bool: whether the balls around two lines meet that together reach (C, D) m further."""
+    (a, half_a), (b, half_b) = (
+        (0.5 * (ends[:, :, 0] + ends[:, :, 1]), 0.5 * np.linalg.norm(ends[:, :, 1] - ends[:, :, 0], axis=2))
+        for ends in (one, other)
+    )
+    square = (a * a).sum(axis=2)[:, :, None] + (b * b).sum(axis=2)[:, None] - 2.0 * (a @ b.transpose(0, 2, 1))
+    return square <= (half_a[:, :, None] + half_b[:, None] + reach) ** 2
+
+
+def nearest(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where straight lines one (K, 2, 3) and other (K, 2, 3) are nearest: the vector (K, 3) m from the other's place to
+    the one's, and the shares (K,) of the way along either (Ericson 2005, Real-Time Collision Detection §5.1.9)."""
+    p, q = one[:, 0], other[:, 0]
+    u, v, w = one[:, 1] - p, other[:, 1] - q, p - q
+    uu, vv, uv = (np.einsum("kc,kc->k", a, b) for a, b in ((u, u), (v, v), (u, v)))
+    uw, vw = np.einsum("kc,kc->k", u, w), np.einsum("kc,kc->k", v, w)
+    uu, vv = np.maximum(uu, 1e-12), np.maximum(vv, 1e-12)
+    across = uu * vv - uv * uv
+    parallel = across < 1e-9 * uu * vv
+    s = np.clip(np.where(parallel, 0.5, (uv * vw - uw * vv) / np.where(parallel, 1.0, across)), 0.0, 1.0)
+    t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
+    s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
+    return w + s[:, None] * u - t[:, None] * v, s, t
+
+
+def overlap(one: Motion, other: Motion) -> np.ndarray:
+    """(T,) m that two bodies are deep in each other at each of their common frames, negative where they are apart (then
+    only down to -1 m)."""
+    ends = lines(one), lines(other)
+    radii = tuple(np.array([part.radius for part in capsules(motion.skeleton)]) for motion in (one, other))
+    found = touching(*ends, radii, -1.0)
+    deepest = np.full(len(one), -1.0)
+    np.maximum.at(deepest, found.frame, found.depth)
+    return deepest

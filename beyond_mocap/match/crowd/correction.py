@@ -1,0 +1,144 @@
+"""What is changed on a body so that it keeps out of others: a few smooth curves, kept at ten knots a second.
+
+The curves are: the root's shift over the ground, each foot's, and by which rotation each arm is turned about its
+shoulder. They are kept as whole tenths of millimetres and of milliradians, so that what is stored and what is in memory
+give the same bits, and are 0 between the pieces in which there is something to change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ...base.easing import quintic_step_by_powers
+from ...base.errors import InputError
+from ...motion import quaternion
+from ...motion.humanoid import identify
+from ...motion.motion import Motion, pose_kinematics
+from ...motion.skeleton import frozen_array
+from .leg_moved import in_parent, leg_moved
+
+ROOT, FEET, ARMS = slice(0, 2), slice(2, 6), slice(6, 12)
+"""Columns: metres (x, y) of the root; metres of the left and the right foot; rotation vectors, rad, of both arms."""
+
+CURVES = 12
+UNIT = 1e-4
+"""Metres and radians that a kept 1 stands for."""
+
+KNOT_SECONDS = 0.1  # between the knots of a correction
+_NOTHING = 5e-4  # m and rad below which a curve changes nothing that anybody sees
+
+
+@dataclass(frozen=True, eq=False)
+class Correction:
+    """knots (N,) int: frames on the match's clock, rising, `step` apart within a piece and more between two pieces;
+    values (N, 12) int16 in UNIT, the columns ROOT, FEET and ARMS; 0 at the ends of pieces. fps: frames per second of
+    that clock. InputError for arrays that do not fit, or knots that do not rise."""
+
+    knots: np.ndarray
+    values: np.ndarray
+    fps: float
+    step: int
+
+    def __post_init__(self):
+        knots, values = frozen_array(self.knots, np.int64), frozen_array(self.values, np.int16)
+        if knots.ndim != 1 or values.shape != (len(knots), CURVES) or np.any(np.diff(knots) < self.step):
+            found = f"knots {knots.shape}, values {values.shape}"
+            raise InputError("correction", found, f"(N,) rising and (N, {CURVES})")
+        if not (self.step >= 1 and self.fps > 0.0):
+            raise InputError("correction", f"{self.step} frames at {self.fps:g} per second", "1 or more, above 0")
+        object.__setattr__(self, "knots", knots)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def none(cls, fps: float) -> Correction:
+        """The one that changes nothing."""
+        return cls(np.zeros(0, int), np.zeros((0, CURVES), int), fps, knot_step(fps))
+
+    @classmethod
+    def of(cls, curves: np.ndarray, first: int, fps: float) -> Correction:
+        """The one whose curves are (T, 12) from frame `first` of the match's clock on, m and rad."""
+        step = knot_step(fps)
+        at = np.arange(-(-first // step) * step, first + len(curves), step)
+        values = np.round(np.clip(curves[at - first] / UNIT, -32767, 32767)).astype(np.int16)
+        some = np.abs(curves[at - first]).max(axis=1, initial=0.0) > _NOTHING
+        kept = some | np.append(some[1:], False) | np.append(False, some[:-1])
+        values[~some] = 0
+        return cls(at[kept], values[kept], fps, step)
+
+    def pieces(self) -> list[tuple[int, int]]:
+        """(first, end) numbers of the knots of each piece."""
+        breaks = np.flatnonzero(np.diff(self.knots) > self.step) + 1
+        edges = [0, *breaks.tolist(), len(self.knots)]
+        return [(low, high) for low, high in zip(edges, edges[1:]) if high - low > 1]
+
+    def curves(self, first: int, count: int) -> np.ndarray:
+        """(T, 12) m and rad at `count` frames from frame `first` on; cubic between knots."""
+        out = np.zeros((count, CURVES))
+        for low, high in self.pieces():
+            start, end = max(int(self.knots[low]), first), min(int(self.knots[high - 1]) + 1, first + count)
+            if start < end:
+                spline = CubicSpline(self.knots[low:high], self.values[low:high] * UNIT, bc_type="clamped")
+                out[start - first : end - first] = spline(np.arange(start, end))
+        return out
+
+
+def knot_step(fps: float) -> int:
+    """Frames from knot to knot."""
+    return max(1, round(KNOT_SECONDS * fps))
+
+
+def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
+    """The motion, whose frame 0 is frame `first` of the match's clock, as corrected: bones as long as they were, feet
+    flat where they were flat, and every bit as it was where nothing is corrected. Each frame is corrected by itself.
+    InputError where rates differ.
+    """
+    if abs(motion.fps - correction.fps) > 1e-9:
+        raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
+    curves = correction.curves(first, len(motion))
+    return carried(motion, curves)
+
+
+def carried(motion: Motion, curves: np.ndarray) -> Motion:
+    """The motion with the curves (T, 12) put on it."""
+    moved = np.flatnonzero(curves.any(axis=1))
+    if not len(moved):
+        return motion
+    skeleton, body, own = motion.skeleton, identify(motion.skeleton), curves[moved]
+    root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
+    places, world = pose_kinematics(skeleton, root[moved], rotations[moved])
+    root[moved, :2] += own[:, ROOT]
+    for side, limb in enumerate((body.left, body.right)):
+        against = own[:, FEET].reshape(-1, 2, 2)[:, side] - own[:, ROOT]
+        turned = leg_moved(skeleton, limb, places, world, np.column_stack([against, np.zeros(len(moved))]))
+        turn = own[:, ARMS].reshape(-1, 2, 3)[:, side]
+        if limb.upper_arm is not None and turn.any():
+            upper = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, limb.upper_arm])
+            turned[limb.upper_arm] = in_parent(skeleton, world, limb.upper_arm, upper)
+        for joint, local in turned.items():
+            rotations[moved, joint] = quaternion.signed_like(local, rotations[moved, joint])
+    return replace(motion, root_positions=root, rotations=rotations)
+
+
+def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correction:
+    """The corrections of neighbouring windows as one.
+
+    parts: (correction, first, end) with the frames of each window's core, in order; each was worked out `reach` frames
+    beyond both ends. Around an edge between two cores the one goes over into the other within 2 `reach` frames.
+    """
+    fps, step = parts[0][0].fps, parts[0][0].step
+    total: dict[int, np.ndarray] = {}
+    for number, (correction, first, end) in enumerate(parts):
+        share = np.ones(len(correction.knots))
+        if number and parts[number - 1][2] == first:
+            share = share * quintic_step_by_powers((correction.knots - first + reach) / (2.0 * reach))
+        if number + 1 < len(parts) and parts[number + 1][1] == end:
+            share = share * quintic_step_by_powers((end + reach - correction.knots) / (2.0 * reach))
+        for knot, weight, values in zip(correction.knots.tolist(), share, correction.values):
+            total[knot] = total.get(knot, 0.0) + weight * values
+    knots = np.array(sorted(total), int)
+    values = np.array([np.round(total[knot]) for knot in knots.tolist()]).reshape(-1, CURVES)
+    return Correction(knots, values, fps, step)

@@ -1,0 +1,134 @@
+"""A window of time with everybody in it: bodies that would be in each other kept apart, and the ball where they meet
+it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...library.features import FPS
+from ...library.library import Library
+from ...annotation.ball_contact import surfaces
+from ...motion.motion import Motion
+from .correction import CURVES, Correction, applied
+from .spacing import keeping
+from ...synthesis.take import Take
+from .restore_ball_contact import at_ball
+from .crowd import kept_apart, overlap_depths
+from ..pieces.cut_plan import cut_plan
+from ..expand import expanded
+from ..match_ball import course, led_by, met
+from ..pieces.named_edit import part
+from ..player_edit import PlayerEdit, Stretch
+
+LONGEST = 60.0
+"""Seconds of a window at most: everybody's motion in it is in memory at once."""
+
+BEYOND = 4.0
+"""Seconds on either side of a window in which everybody is looked at too."""
+
+REACH = 2.0
+"""Seconds around an edge between two windows in which the corrections of one go over into the other's."""
+
+_SETTLED = 8.0  # s of an edit list, beyond those, by which its motion does not depend on where it begins
+
+
+@dataclass(frozen=True, eq=False)
+class CrowdPart:
+    """What a window says of one player. correction: of his motion; frames (K,) of the match's clock at which he is in
+    somebody, and depth (K,) m how deep when corrected; before: m, the deepest without it; led_frames (L,) and led (L,
+    3) m: where he leads the ball (`match_ball.led_by`)."""
+
+    correction: Correction
+    frames: np.ndarray
+    depth: np.ndarray
+    before: float
+    led_frames: np.ndarray
+    led: np.ndarray
+
+
+def cut_edit(edit: PlayerEdit, start: float, end: float) -> PlayerEdit:
+    """A player's edit list around a window, which lays out as the whole one does from `start` to `end` s; without
+    stretches where he is away."""
+    cuts = (_cut_stretch(stretch, start - _SETTLED, end + _SETTLED) for stretch in edit.stretches)
+    return replace(edit, stretches=tuple(cut for cut in cuts if cut is not None))
+
+
+def _cut_stretch(stretch: Stretch, start: float, end: float) -> Stretch | None:
+    begin = float(stretch.plan.track.times[0])
+    first = max(0, int(np.floor((start - begin) * FPS + 1e-6)))
+    last = min(len(stretch.edit), int(np.ceil((end - begin) * FPS - 1e-6)) + 1)
+    if last - first < FPS:
+        return None
+    plan = cut_plan(stretch.plan, begin + first / FPS, begin + (last - 1) / FPS)
+    return replace(stretch, plan=plan, edit=part(stretch.edit, first, last))
+
+
+def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
+    """What the window from `start` to `end` s says of each player; edits: cut to it and BEYOND on either side
+    (`cut_edit`). The same input gives the same bits."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        takes = [expanded(library, edit, start - BEYOND, end + BEYOND) if edit.stretches else () for edit in edits]
+        flat = [take for own in takes for take in own]
+        fps = flat[0].motion.fps if flat else 1.0
+        firsts = [round(take.start_time * fps) for take in flat]
+        firm = [_firm(take) for take in flat]
+        own, contacts = [take.motion for take in flat], [take.contacts for take in flat]
+        corrections = kept_apart(own, contacts, firsts, fps, firm)
+        led = [led_by(take) for take in flat]
+        motions = [applied(take.motion, *own) for take, own in zip(flat, zip(corrections, firsts))]
+        motions = [_on_the_ball(*own, led) for own in zip(flat, motions, firsts)]
+        before = overlap_depths([take.motion for take in flat], firsts)
+        after = overlap_depths(motions, firsts)
+    inside = round(start * fps), round(end * fps)
+    rows, out = iter(zip(corrections, firsts, before, after, led)), []
+    for own in takes:
+        out.append(_part([next(rows) for _ in own], inside, fps))
+    return tuple(out)
+
+
+def _firm(take: Take) -> np.ndarray:
+    """(T,) how firmly a player keeps his way: more where he touches the ball."""
+    touching = [key.frame for key in take.keys if surfaces(take.motion.skeleton, key.touching)]
+    return keeping(len(take.motion), np.array(touching), take.motion.fps)
+
+
+def _on_the_ball(take: Take, motion: Motion, first: int, led: Sequence[tuple[np.ndarray, np.ndarray]]) -> Motion:
+    """A player's corrected motion with its touches at the ball, which everybody has `led`."""
+    if take.ball is None:
+        return motion
+    ball = met(course(take.plan, take.ball.times), first, led)
+    return at_ball(replace(take, motion=motion), ball.positions).motion
+
+
+def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
+    """One player's part, out of his takes with what was found of each."""
+    frames, depth, before = [np.zeros(0, int)], [np.zeros(0)], 0.0
+    led_frames, led = [np.zeros(0, int)], [np.zeros((0, 3))]
+    for _, first, deep, deep_after, (at, off) in rows:
+        own = np.flatnonzero(deep_after > 0.0) + first
+        mine = (own >= inside[0]) & (own < inside[1])
+        frames.append(own[mine])
+        depth.append(deep_after[own[mine] - first])
+        mine = (at >= inside[0]) & (at < inside[1])
+        led_frames.append(at[mine])
+        led.append(off[mine])
+        core = slice(max(inside[0] - first, 0), max(inside[1] - first, 0))
+        before = max(before, float(deep[core].max(initial=0.0)))
+    return CrowdPart(
+        in_turn([correction for correction, *_ in rows], fps), np.concatenate(frames), np.concatenate(depth), before,
+        np.concatenate(led_frames), np.concatenate(led),
+    )  # fmt: skip
+
+
+def in_turn(corrections: Sequence[Correction], fps: float) -> Correction:
+    """Corrections of one player at different times as one."""
+    if not corrections:
+        return Correction.none(fps)
+    knots = np.concatenate([one.knots for one in corrections])
+    values = np.concatenate([one.values for one in corrections]).reshape(-1, CURVES)
+    return Correction(knots, values, corrections[0].fps, corrections[0].step)

@@ -1,0 +1,120 @@
+"""Tracks that come nearer than two trunks allow pushed apart, before anything is made from them.
+
+The shifts are the least smooth ones: sum STAY (|s|^2 + SECONDS^6 |s'''|^2) over everybody, plus the square of what is
+lacking of the distance while two are too near. Which way they are pushed turns with how they lie to each other; where
+one goes straight through the other that would be one way and at once the other, so the first rounds smooth its
+direction over time, and they pass each other on the side on which they miss each other.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.banded_least_squares import BandedLeastSquares
+from ...base.arctangent import arctan2
+from ...base.runs import runs
+from ...motion.track import zero_phase_hann
+from .episodes import Episode, episodes
+
+DISTANCE = 0.55
+"""Metres between the middles of two bodies that stand or run beside each other."""
+
+STAY, SECONDS = 0.003, 0.5
+"""Weight of a shift against what lacks of the distance, and seconds within which it comes and goes."""
+
+REACH = 2.5
+"""Seconds before and behind a meeting within which shifts begin and end."""
+
+STEADY = 30.0
+"""How much firmer who touches the ball keeps his way."""
+
+_TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
+_ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
+_HELD = 1e6  # weight that holds a value: far above all others
+
+
+def spaced(
+    times: np.ndarray, positions: np.ndarray, keep: np.ndarray | None = None, distance: float = DISTANCE
+) -> np.ndarray:
+    """(P, N, 2) m by which P bodies give way to each other.
+
+    times (N,) s, rising evenly; positions (P, N, 2) m, NaN where somebody is not there; keep (P, N): how firmly each
+    keeps his way against the others', 1 by default (`keeping`). Shifts are 0 but around meetings, and at the first and
+    last frame.
+    """
+    shifts = np.zeros(positions.shape)
+    if len(times) < 4:
+        return shifts
+    fps = (len(times) - 1) / (times[-1] - times[0])
+    firm = np.ones(positions.shape[:2]) if keep is None else keep
+    for episode in episodes(positions, distance, round(REACH * fps)):
+        span, bodies = slice(episode.first, episode.end), list(episode.bodies)
+        shifts[bodies, span] = _pushed(episode, positions[bodies, span], firm[bodies, span], distance, fps)
+    return np.where(np.isfinite(positions), shifts, 0.0)
+
+
+def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
+    """(T,) how firmly somebody keeps his way who touches the ball at frames `moments` (K,): STEADY there, 1 from
+    `seconds` before and behind on."""
+    if not len(moments):
+        return np.ones(count)
+    away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
+    return 1.0 + (STEADY - 1.0) * np.cos(0.5 * np.pi * np.clip(away, 0.0, 1.0)) ** 2
+
+
+def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: float, fps: float) -> np.ndarray:
+    """(K, T, 2) m: the shifts of one episode's bodies, whose places (K, T, 2) m and firmness (K, T) are given."""
+    bodies, count = len(places), places.shape[1]
+    calm = _calm(firm, fps)
+    number = {body: row for row, body in enumerate(episode.bodies)}
+    pairs = [(number[one], number[other]) for one, other in episode.pairs]
+    shifts = np.zeros(places.shape)
+    for turn in range(_ROUNDS):
+        seconds = _TURNED[turn] if turn < len(_TURNED) else 0.0
+        rows = [_lacking(places, shifts, pair, distance, seconds, fps) for pair in pairs]
+        index, values, goal = (np.concatenate(parts) for parts in zip(*rows))
+        if not len(index):
+            break
+        squares = calm.copy()
+        squares.add_rows(index, values, np.ones(len(index)), goal)
+        least = squares.solve().reshape(count, bodies, 2).transpose(1, 0, 2)
+        shifts = shifts + _STEP * (least - shifts)
+    return shifts
+
+
+def _calm(firm: np.ndarray, fps: float) -> BandedLeastSquares:
+    """The sum of squares that keeps shifts small and smooth, and holds both ends; firm (K, T)."""
+    squares = BandedLeastSquares(firm.shape[1], 2 * len(firm))
+    held = np.zeros(firm.shape[1])
+    held[:2], held[-2:] = _HELD, _HELD
+    for body, weight in enumerate(firm):
+        for axis in (0, 1):
+            squares.add_value(STAY * weight + held, 2 * body + axis)
+            squares.add_smoothness(STAY * (SECONDS * fps) ** 6 * weight, 2 * body + axis)
+    return squares
+
+
+def _lacking(
+    places: np.ndarray, shifts: np.ndarray, pair: tuple[int, int], distance: float, seconds: float, fps: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The rows of one pair for `BandedLeastSquares.add_rows`: where it is too near, which way and how far it has to
+    part; the directions smoothed over `seconds`."""
+    one, other = pair
+    bodies = len(places)
+    off = places[one] + shifts[one] - places[other] - shifts[other]
+    near = np.einsum("tk,tk->t", off, off) < distance**2
+    directions, needs = np.zeros(off.shape), np.zeros(len(off))
+    for low, high in runs(near):
+        part = off[low:high]
+        angle = np.unwrap(arctan2(part[:, 1], part[:, 0]))
+        if seconds and high - low > 2:
+            angle = zero_phase_hann(angle[:, None], fps, seconds)[:, 0]
+        way = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+        along = np.einsum("tk,tk->t", way, part)
+        needs[low:high] = np.sqrt(along**2 + distance**2 - np.einsum("tk,tk->t", part, part)) - along
+        directions[low:high] = way
+    frame = np.flatnonzero(near)
+    way, need = directions[frame], np.minimum(needs[frame], distance)
+    index = (frame * 2 * bodies)[:, None] + np.array([2 * one, 2 * one + 1, 2 * other, 2 * other + 1])
+    apart = (shifts[one] - shifts[other])[frame]
+    return index, np.concatenate([way, -way], axis=1), need + np.einsum("tk,tk->t", way, apart)

@@ -1,0 +1,299 @@
+"""Events brought to the tracking's clock: people and their software write events down seconds late, and their clock may
+run apart from the cameras'.
+
+Touches of the ball are solved from tracking (`solve_ball`); an event of a player belongs to one of his touches. Over
+all pairs of an event and a touch of the same player, the difference of times that comes most often is the lag of a
+period; a line through the pairs near it takes out what the clocks run apart. People are seconds late, not minutes, so a
+far lag counts for less than a near one, by a Cauchy distribution around none: among few pairs a near one wins, and a
+clock that is minutes off needs some three agreeing pairs more than one that is seconds off. Events are believed where
+so many fit that chance does not explain it, at any lag as likely as theirs. Then each player's events and touches are
+brought together in order, as two lines of text are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...annotation.event_words import EVENT_KINDS
+from ...ball.tracked.kinds import TOUCH_KINDS
+from ...ball.tracked.solve import SolvedTouch
+from ...base.errors import InputError
+from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ...motion.track.match_data import Half
+
+MOST_LAG = 300.0
+"""Seconds by which clocks may differ: a feed whose clock begins elsewhere, if enough of its events say so."""
+
+WINDOW = 2.0
+"""Seconds from its place on the mended clock within which an event's touch is looked for."""
+
+_BIN = 0.1  # s of lag that are told apart
+_SPREAD = 0.5  # s by which lags of one period scatter
+_MOST_DRIFT = 0.002  # s a second
+_FEWEST = 8  # events whose players touch the ball, below which nothing can be told
+_INSIDE = 4  # passes and shots within what was solved, below which a lag may be chance
+_SURE = 30  # pairs from which a drift is told from scatter
+_TELLING = 15  # of them, below which events that do not fit may be of this match all the same
+_LEAST_MATCHED, _ABOVE_CHANCE = 0.3, 1.6  # share of the certain events that must fit, and how much more than by chance
+_USUAL_LAG = 5.0  # s
+_LEAST_CHANCE = 0.04  # of an event to fit with a wrong lag: few events in a short span show it badly
+_LEAST_SURE = 4.0  # nats
+_PAIR = 2.7  # nats that a pair is worth
+_DOUBTFUL = 0.3  # of an event that may be no touch, where one that is a touch for certain counts 1
+_SENDING = {kind.name for kind in EVENT_KINDS if kind.ball == "sends"}
+_TAKING = {kind.name for kind in EVENT_KINDS if kind.ball == "takes"}
+_SENT = {kind.name for kind in TOUCH_KINDS if kind.ball == "sends"}
+_TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
+_CHANCES = (-97.0, -71.0, -53.0, -37.0, 37.0, 53.0, 71.0, 97.0)  # s by which lags are wrong for certain
+_NEAR = 1.0  # s within which an event fits, for these shares
+_UNLIKE = 0.6  # s that another kind or part of the body is worth
+_NO_TOUCH = 1.4  # s that an event without a touch is worth
+
+
+@dataclass(frozen=True)
+class PeriodClock:
+    """lag: s that events of a period are later than their touches, at its begin; drift: s that it grows each second.
+    spread: s, the usual distance from it (median absolute deviation times 1.48). matched: share of the events that are
+    touches for certain which have one; by_chance: the same with wrong lags. told: how many these events are. sure:
+    nats, how unlikely it is that so many fit by chance at a lag as far off (`_sure`)."""
+
+    lag: float
+    drift: float
+    spread: float
+    matched: float
+    by_chance: float
+    told: int
+    sure: float
+
+    @property
+    def fits(self) -> bool:
+        """Whether its events fit touches better than by chance."""
+        return self.sure >= _LEAST_SURE and self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
+
+
+@dataclass(frozen=True)
+class AlignedEvents:
+    """The events of a match on the tracking's clock. events: as given. times: (E,) s of each on the match's clock, lag
+    taken out; NaN in halves whose clock cannot be set. touches: (E,) the index of each one's solved touch, -1 where it
+    has none. clocks: period -> its clock. notes: lines for people."""
+
+    events: tuple[MatchEvent, ...]
+    times: np.ndarray
+    touches: np.ndarray
+    clocks: Mapping[int, PeriodClock]
+    notes: tuple[str, ...] = ()
+
+
+def aligned(
+    events: MatchEvents, touches: Sequence[SolvedTouch], halves: Sequence[Half],
+    span: tuple[float, float] | None = None,
+) -> AlignedEvents:
+    """Events on the tracking's clock, each with its touch.
+
+    touches: solved, on the match's clock, in order; halves: of the match. span: seconds within which
+    touches were solved, by default all; events outside it keep their place and no touch. A period whose events fit no
+    better than by chance is left out. InputError where that is so of all, and of many events: they are of another
+    match.
+    """
+    span = span or (-np.inf, np.inf)
+    times, clocks, notes = np.full(len(events.events), np.nan), {}, []
+    for half in halves:
+        members = [i for i, event in enumerate(events.events) if event.period == half.number]
+        own = [touch for touch in touches if half.start <= touch.time <= half.end]
+        found = _half_clock([events.events[i] for i in members], own, half, span)
+        if found is None:
+            if members and own:
+                told = "too few events of players who touch the ball to set its clock: they are left out"
+                notes.append(f"period {half.number}: {told}")
+            continue
+        clocks[half.number], times[members] = found
+    _check(events, clocks)
+    for number in [number for number, clock in clocks.items() if not clock.fits]:
+        notes.append(f"{_told(number, clocks.pop(number))}, which may be chance: they are left out")
+        times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
+    pairs = _pairs(events.events, times, touches)
+    notes += [_told(number, clock) for number, clock in clocks.items()]
+    return AlignedEvents(events.events, times, pairs, clocks, tuple(notes))
+
+
+def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
+    """A half's clock, and its events' times (E,) s on the match's; None where nothing can be told. A clock that does
+    not count from the half's begin is tried from its first frame."""
+    since = np.array([event.time for event in events])
+    tried = []
+    for zero in dict.fromkeys((half.zero, half.start)):
+        clock = _clock(events, since, touches, zero, span)
+        if clock is not None:
+            tried.append((clock, zero + (since - clock.lag) / (1.0 + clock.drift)))
+    return max(tried, key=lambda one: one[0].sure, default=None)
+
+
+def _told(number: int, clock: PeriodClock) -> str:
+    drift = f", {1000.0 * clock.drift:+.2f} s more in 1000 s" if clock.drift else ""
+    return (
+        f"period {number}: events come {clock.lag:.2f} s after their touches{drift}, "
+        f"give or take {clock.spread:.2f} s; "
+        f"{clock.matched:.0%} of passes and shots fit (by chance {clock.by_chance:.0%})"
+    )
+
+
+def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
+    """The clock of one period, that stands at 0 at `start` s: since (E,) s are its events' times on it."""
+    when = np.array([touch.time - start for touch in touches])
+    who = np.array([touch.player for touch in touches])
+    sent = np.array([touch.kind in _SENT for touch in touches], bool)
+    early, late, origin = [], [], []
+    for event, time in zip(events, since):
+        if event.played and event.player and np.isfinite(time):
+            own = when[(who == event.player) & (sent if event.kind in _SENDING else True)]
+            near = own[np.abs(time - own) <= MOST_LAG]
+            early += [time] * len(near)
+            late += near.tolist()
+            origin += [event.kind in CERTAIN] * len(near)
+    if len(set(early)) < _FEWEST:
+        return None
+    early, late, certain = np.array(early), np.array(late), np.array(origin)
+    lag = _commonest(early - late, np.where(certain, 1.0, _DOUBTFUL))
+    lag, drift = _line(early, late, lag)
+    fit = _Fit(events, since, when, who, (span[0] - start, span[1] - start), drift)
+    right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
+    if right[0, 1] < _INSIDE:
+        return None
+    rest = early - late * (1.0 + drift) - lag
+    near = rest[np.abs(rest) < 3.0 * _SPREAD]
+    spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
+    matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
+    sure = _sure(*right[0], chance) + _DOUBTFUL * _sure(*right[1], wrong[1, 0] / max(wrong[1, 1], 1)) - _far(lag)
+    return PeriodClock(float(lag), float(drift), spread, float(matched), float(chance), int(right[0, 1]), float(sure))
+
+
+def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:
+    """The lag (s) around which most weight lies, within _SPREAD, less what a far one costs; of equal ones the least."""
+    edges = np.arange(-MOST_LAG - 1.0, MOST_LAG + 1.0 + _BIN, _BIN)
+    counts, _ = np.histogram(lags, edges, weights=weights)
+    reach = np.arange(-15, 16) * _BIN
+    middles = 0.5 * (edges[1:] + edges[:-1])
+    smooth = np.convolve(counts, np.exp(-0.5 * (reach / _SPREAD) ** 2), "same") - _far(middles) / _PAIR
+    smooth -= smooth.min()
+    best = np.flatnonzero(smooth >= smooth.max() * (1.0 - 1e-9))
+    return float(middles[best[np.abs(middles[best]).argmin()]])
+
+
+def _far(lag):
+    """Nats by which a lag (s) is less likely than none: long tails (Cauchy's) around the usual ones."""
+    return np.log1p((lag / _USUAL_LAG) ** 2)
+
+
+def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float]:
+    """Lag at the begin and drift of the line through the pairs near `lag`, those far from it counting less and less;
+    a drift only where many pairs over a long time tell of one."""
+    found, drift = lag, 0.0
+    for reach in (6.0 * _SPREAD, 4.0 * _SPREAD, 3.0 * _SPREAD, 2.0 * _SPREAD, 2.0 * _SPREAD):
+        off = early - late * (1.0 + drift) - found
+        near = np.abs(off) < reach
+        if np.count_nonzero(near) < _FEWEST:
+            break
+        x, y = late[near], (early - late)[near]
+        weights = (1.0 - (off[near] / reach) ** 2) ** 2
+        middle = np.average(x, weights=weights)
+        around = np.average((x - middle) ** 2, weights=weights)
+        mean = np.average(y, weights=weights)
+        slope = np.average((x - middle) * (y - mean), weights=weights) / max(around, 1e-9)
+        error = np.sqrt(np.average((y - mean) ** 2, weights=weights) / max(around, 1e-9) / np.count_nonzero(near))
+        told = np.count_nonzero(near) >= _SURE and abs(slope) > 4.0 * error and abs(slope) < _MOST_DRIFT
+        drift = float(slope) if told else 0.0
+        found = float(mean - drift * middle)
+    return found, drift
+
+
+class _Fit:
+    """Which events of players have a touch of theirs within _NEAR, at one lag or another. when (T,) s and who (T,) of
+    touches, since (E,) s of events and span s on the period's clock."""
+
+    def __init__(self, events, since: np.ndarray, when: np.ndarray, who: np.ndarray, span, drift: float):
+        self._span, self._drift, self._rows = span, drift, []
+        known = np.isfinite(since)
+        named = np.array([event.player for event in events])
+        certain = np.array([event.kind in CERTAIN for event in events], bool)
+        played = known & np.array([event.played for event in events], bool) & (named != "")
+        for player in np.unique(named[played]):
+            own = played & (named == player)
+            edges = np.concatenate([[-np.inf], np.sort(when[who == player]), [np.inf]])
+            self._rows.append((since[own], certain[own], edges))
+
+    def at(self, lags) -> np.ndarray:
+        """[fitting, all] within the span: of those that are touches for certain, and of the others; over all `lags`."""
+        out = np.zeros((2, 2), int)
+        for since, certain, edges in self._rows:
+            there = (since - np.reshape(lags, (-1, 1))) / (1.0 + self._drift)
+            after = np.searchsorted(edges, there)
+            near = np.minimum(edges[after] - there, there - edges[after - 1]) <= _NEAR
+            inside = (there >= self._span[0]) & (there <= self._span[1])
+            for row, which in enumerate((certain, ~certain)):
+                out[row] += np.count_nonzero(inside & near & which), np.count_nonzero(inside & which)
+        return out
+
+
+def _sure(fitting: int, count: int, chance: float) -> float:
+    """Nats: how unlikely it is that as many of `count` fit by `chance` (Chernoff's bound of a binomial's tail)."""
+    chance = min(max(chance, _LEAST_CHANCE), 0.99)
+    share = fitting / max(count, 1)
+    if share <= chance:
+        return 0.0
+    rest = (1.0 - share) * np.log((1.0 - share) / (1.0 - chance)) if share < 1.0 else 0.0
+    return float(count * (share * np.log(share / chance) + rest))
+
+
+def _check(events: MatchEvents, clocks: Mapping[int, PeriodClock]) -> None:
+    """InputError where no period fits better than by chance, and there are enough events to tell."""
+    many = sum(clock.told for clock in clocks.values()) >= _TELLING
+    if many and not any(clock.fits for clock in clocks.values()):
+        best = max(clocks.values(), key=lambda clock: clock.matched)
+        found = f"{best.matched:.0%} of passes and shots fit a touch of their player (by chance {best.by_chance:.0%})"
+        raise InputError(events.where, found, "events of the same match", "check both files")
+
+
+def _pairs(events: Sequence[MatchEvent], times: np.ndarray, touches: Sequence[SolvedTouch]) -> np.ndarray:
+    """(E,) the index of each event's touch, -1 for none: for each player the cheapest way to bring both in order."""
+    out = np.full(len(events), -1)
+    for player in sorted({event.player for event in events if event.player}):
+        own = [i for i, event in enumerate(events) if event.player == player and event.played and np.isfinite(times[i])]
+        own.sort(key=lambda i: times[i])
+        his = [i for i, touch in enumerate(touches) if touch.player == player]
+        for event, touch in _together(own, his, events, times, touches):
+            out[event] = touch
+    return out
+
+
+def _together(own, his, events, times, touches) -> list[tuple[int, int]]:
+    """Pairs (event, touch) in the order of both, by dynamic programming."""
+    best = np.full((len(own) + 1, len(his) + 1), np.inf)
+    best[0], way = 0.0, np.zeros(best.shape, int)
+    for row, event in enumerate(own, 1):
+        best[row, 0] = best[row - 1, 0] + _NO_TOUCH
+        for column, touch in enumerate(his, 1):
+            cost = _unlike(events[event], touches[touch], times[event])
+            ways = (best[row - 1, column] + _NO_TOUCH, best[row, column - 1], best[row - 1, column - 1] + cost)
+            way[row, column] = int(np.argmin(ways))
+            best[row, column] = ways[way[row, column]]
+    row, column, found = len(own), len(his), []
+    while row and column:
+        step = way[row, column]
+        if step == 2:
+            found.append((own[row - 1], his[column - 1]))
+        row, column = row - (step != 1), column - (step > 0)
+    return found[::-1]
+
+
+def _unlike(event: MatchEvent, touch: SolvedTouch, time: float) -> float:
+    """Seconds: how far a touch is from an event, and how unlike it; inf beyond WINDOW."""
+    off = abs(touch.time - time)
+    if off > WINDOW:
+        return np.inf
+    wanted = _SENT if event.kind in _SENDING else _TAKEN if event.kind in _TAKING else {touch.kind}
+    unlike = touch.kind not in wanted
+    other_part = event.part in ("head", "hand") and touch.part != event.part
+    return off + _UNLIKE * unlike + 0.5 * _UNLIKE * other_part

@@ -1,0 +1,237 @@
+"""What everybody does with the ball and when, as words: from solved touches, and from a provider's events.
+
+    words = words_of(match, solve_ball(match), read_events("events.xml", match=match))
+    timeline = words.timeline("home_7", 0.0, 60.0)
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...annotation import KeyMoment, Span, Timeline
+from ...annotation.ball_contact import takes_with_foot
+from ...annotation.event_words import EventWords, read_event_words
+from ...ball.tracked import kinds
+from ...ball.tracked.solve import SolvedBall, SolvedTouch
+from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ...motion.track.match_data import Match
+from .event_clock import AlignedEvents, aligned
+
+LEAST_CONFIDENCE = 0.3
+"""Touches of less make no key moment."""
+
+NEAREST = 0.5
+"""Seconds; a player who touches the ball twice within them shows one of both."""
+
+TOUCHES, EVENTS, BOTH, USER = "touches", "events", "touches and events", "user"
+"""Where a moment comes from."""
+
+_RUNNING = 2.0  # m/s, from which a touch is made running
+_HIGH_FOOT, _HIGH_HAND, _LOW_HAND = 0.45, 1.5, 0.7  # m of the ball's centre
+_JUMP = 2.05  # m of the ball's centre, which nobody heads standing
+_CAUGHT = 3.0  # m/s of the ball after a save that held it
+_CHAIN = 3.0  # s between touches of one dribble
+_SHORTEST = 0.8  # s of a dribble
+_FORGETS = 0.2  # of what is doubtful in a touch, with an event that tells of it too
+_TOLD = 0.4  # confidence in an event without a touch
+_SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
+_LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
+_DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a player does: time s on the match's clock; words; source: TOUCHES, EVENTS, BOTH or USER; confidence 0 to 1.
+    end: s, of a stretch that begins at `time`, None for a key moment."""
+
+    time: float
+    words: tuple[str, ...]
+    source: str
+    confidence: float
+    end: float | None = None
+
+
+@dataclass(frozen=True)
+class MatchWords:
+    """players: id -> moments in order of time, for everybody, () for who never touches the ball. notes: lines for
+    people. figures: of the events' clock and how they fit, {} without events."""
+
+    players: Mapping[str, tuple[Moment, ...]]
+    notes: tuple[str, ...] = ()
+    figures: Mapping[str, object] = field(default_factory=dict)
+
+    def timeline(self, player: str, start: float = -np.inf, end: float = np.inf) -> Timeline:
+        """One player's words between two times (s), stretches cut there."""
+        return timeline_of(self.players.get(player, ()), start, end)
+
+
+def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
+    """Moments between two times (s) as a timeline, stretches cut there."""
+    spans, keys = [], []
+    for moment in moments:
+        if moment.end is None:
+            keys += [KeyMoment(moment.time, moment.words)] * (start <= moment.time <= end)
+        elif min(moment.end, end) > max(moment.time, start):
+            spans.append(Span(max(moment.time, start), min(moment.end, end), moment.words))
+    return Timeline(tuple(spans), tuple(keys))
+
+
+def words_of(
+    match: Match, solved: SolvedBall | None, events: MatchEvents | None = None, table: EventWords | None = None
+) -> MatchWords:
+    """Everybody's moments. solved: the ball, on the match's clock; None where it cannot be solved. events: what a
+    provider's people wrote down. table: from what happened to words, by default the one that comes with us.
+
+    A touch becomes a key moment with the words that the table has for it, or for the event that tells of it too; its
+    time is the touch's. Touches of one player in a row are a stretch of dribble. A pass, shot or save without a touch
+    becomes a key moment at its place on the mended clock. Of two within NEAREST the surer one stays. What is not known
+    (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no better
+    than by chance.
+    """
+    table = table or read_event_words()
+    touches = solved.touches if solved else ()
+    span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
+    onto = aligned(events, touches, match.halves, span) if events and solved else None
+    told = {touch: event for event, touch in enumerate(onto.touches) if touch >= 0} if onto else {}
+    heights, left_out, players = has_heights(match), Counter(), {}
+    for player, path in zip(match.players, match.positions):
+        own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
+        found = [
+            moment_of(touch, match.times, path, heights, table, onto.events[told[i]] if i in told else None)
+            for i, touch in own
+        ]
+        found = [moment for moment in found if moment]
+        sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
+        sure += _untouched(player.id, onto, span, match.times, path, table, found) if onto else []
+        kept = apart(sure)
+        left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
+        left_out["close"] += len(sure) - len(kept)
+        players[player.id] = ordered([*kept, *dribbles([touch for _, touch in own])])
+    notes = (*(events.notes if events else ()), *(onto.notes if onto else ()), *_notes(touches, left_out))
+    return MatchWords(players, notes, _figures(onto, touches, span) if onto else {})
+
+
+def _untouched(player: str, onto: AlignedEvents, span, times, path, table, beside) -> list[Moment]:
+    """Moments of one player's events that are touches for certain and have none, but where another moment of his
+    shows the same."""
+    out = []
+    for index, event in enumerate(onto.events):
+        time = float(onto.times[index])
+        if event.player != player or event.kind not in CERTAIN or onto.touches[index] >= 0:
+            continue
+        if not span[0] <= time <= span[1] or any(abs(one.time - time) < _SHOWN_BY for one in beside):
+            continue
+        filled_in = {**seen_words(time, times, path), "side": event.side}
+        words = table.words(event.kind, event.part or "foot", event.details, filled_in)
+        out += [Moment(round(time, 3), words, EVENTS, _TOLD)] * bool(words)
+    return out
+
+
+def _figures(onto: AlignedEvents, touches, span) -> dict[str, object]:
+    """How the events fit: counts, and each period's clock."""
+    inside = [i for i, time in enumerate(onto.times) if span[0] <= time <= span[1] and onto.events[i].played]
+    certain = [i for i in inside if onto.events[i].kind in CERTAIN]
+    off = [touches[onto.touches[i]].time - onto.times[i] for i in inside if onto.touches[i] >= 0]
+    return {
+        "events": len(inside), "with_touch": len(off), "certain": len(certain),
+        "certain_with_touch": sum(onto.touches[i] >= 0 for i in certain),
+        "residual_s": {"median": float(np.median(off)), "sd": float(np.std(off))} if off else None,
+        "clocks": {str(number): vars(clock) for number, clock in onto.clocks.items()},
+    }  # fmt: skip
+
+
+def has_heights(match: Match) -> bool:
+    """Whether the feed has heights of the ball."""
+    seen = np.isfinite(match.ball[:, :2]).all(axis=1)
+    return bool(seen.any() and np.isfinite(match.ball[seen, 2]).mean() > 0.8)
+
+
+def moment_of(
+    touch: SolvedTouch, times: np.ndarray, path: np.ndarray, heights: bool, table: EventWords,
+    event: MatchEvent | None = None,
+) -> Moment | None:  # fmt: skip
+    """The key moment of a touch, None where it makes none. times (N,) s and path (N, 2) m of its player; heights:
+    whether the touch's is known. event: what tells of the same touch; its words count before the touch's own."""
+    kind, details = _LIKE_EVENT[touch.kind]
+    if touch.kind == kinds.SAVE and np.linalg.norm(touch.after) > _CAUGHT:
+        details = (*details, "parried")
+    filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
+    if event is None:
+        words = table.words(kind, touch.part, details, filled_in)
+        return Moment(round(touch.time, 3), words, TOUCHES, round(touch.confidence, 3)) if words else None
+    part, filled_in = event.part or touch.part, {**filled_in, "side": event.side}
+    if part != touch.part:
+        filled_in.update(height_words(part, touch.position[2], heights))
+    words = table.words(event.kind, part, event.details, filled_in) or table.words(kind, part, details, filled_in)
+    sure = 1.0 - _FORGETS * (1.0 - touch.confidence)
+    return Moment(round(touch.time, 3), words, BOTH, round(sure, 3)) if words else None
+
+
+def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
+    """The gait at a moment, from a player's path (N, 2) m at `times` (N,) s."""
+    near = slice(*np.searchsorted(times, [time - 0.3, time + 0.3]))
+    there = np.isfinite(path[near]).all(axis=1)
+    seen, when = path[near][there], times[near][there]
+    if len(seen) < 2:
+        return {}
+    away = np.linalg.norm(seen[-1] - seen[0]) / (when[-1] - when[0])
+    return {"gait": "running" if away > _RUNNING else "standing"}
+
+
+def height_words(part: str, height: float, known: bool) -> dict[str, str]:
+    """The height word of a touch with the ball's centre at `height` m, and jump."""
+    if not known:
+        return {}
+    if part == "hand":
+        return {"height": "high" if height > _HIGH_HAND else "low" if height < _LOW_HAND else "middle"}
+    return {"height": "high" if height > _HIGH_FOOT else "low", "jump": "jump" if height > _JUMP else ""}
+
+
+def apart(moments: Iterable[Moment]) -> list[Moment]:
+    """Of key moments (of one player) within NEAREST the surest: events before touches, sent before taken balls."""
+    kept: list[Moment] = []
+    for moment in sorted(moments, key=_weight, reverse=True):
+        if all(abs(moment.time - other.time) >= NEAREST for other in kept):
+            kept.append(moment)
+    return kept
+
+
+def _weight(moment: Moment) -> tuple[float, float]:
+    told = 0.5 * (moment.source in (EVENTS, BOTH)) + 0.3 * (not takes_with_foot(moment.words))
+    return moment.confidence + told, -moment.time
+
+
+def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
+    """The stretches in which one player drives the ball: touches in a row, one of them a dribble's."""
+    out, first = [], 0
+    for index in range(1, len(touches) + 1):
+        if index < len(touches) and touches[index].time - touches[index - 1].time < _CHAIN:
+            if touches[index - 1].kind in (kinds.DRIBBLE, kinds.RECEIVE):
+                continue
+        chain, first = touches[first:index], index
+        lasts = chain[-1].time - chain[0].time
+        if lasts >= _SHORTEST and any(touch.kind == kinds.DRIBBLE for touch in chain):
+            sure = float(np.mean([touch.confidence for touch in chain]))
+            out.append(
+                Moment(round(chain[0].time, 3), _DRIBBLE.labels, TOUCHES, round(sure, 3), round(chain[-1].time, 3))
+            )
+    return out
+
+
+def ordered(moments: Iterable[Moment]) -> tuple[Moment, ...]:
+    """Moments by time, stretches before key moments."""
+    return tuple(sorted(moments, key=lambda moment: (moment.time, moment.end is None)))
+
+
+def _notes(touches, left_out: Counter) -> list[str]:
+    strangers = sum(not touch.player for touch in touches)
+    told = [
+        (strangers, "touches of the ball by nobody who is tracked"),
+        (left_out["doubtful"], f"touches of less than {LEAST_CONFIDENCE:g} confidence make no key moment"),
+        (left_out["close"], f"touches within {NEAREST:g} s of a surer one of the same player make no key moment"),
+    ]
+    return [f"{count} {what}" for count, what in told if count]

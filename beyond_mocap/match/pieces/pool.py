@@ -1,0 +1,346 @@
+"""Pieces of work spread over processes of this machine, or over a Dask cluster; whatever does them, the results are the
+same.
+
+    for key, result in run(tasks, work, workers=2):
+        ...
+
+Local workers are plain Python processes (joblib's loky); with a scheduler, the workers of its cluster. A worker that
+dies costs the pieces it had in hand, which are done again by others; a piece that ends its worker every time fails
+alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from typing import NoReturn
+
+from ...base.errors import BeyondMocapError, Cancelled, InputError
+
+AHEAD = 2
+"""Pieces that each worker has in hand or waiting: enough that none is idle, few enough to keep them out of memory."""
+
+POLL = 0.2
+"""Seconds between two looks at whether the user wants out."""
+
+PATIENCE = 60.0
+"""Seconds without any worker after which a cluster is given up."""
+
+_ANSWERS = "10s"  # how long a scheduler may take to answer
+_IDLE = 60  # s after which a local worker without work ends
+_BREAKS = 2  # breaks of the workers after which pieces go one by one
+
+Work = Callable[..., object]
+Task = tuple[object, tuple]
+"""A key, and the arguments that the work is called with."""
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A piece of work that could not be done, and why, in one line."""
+
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """A piece of work that was tried: its result, the MB that its process has needed at most so far, and the seconds of
+    processor time that the piece took."""
+
+    result: object
+    memory: float = 0.0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Workplace:
+    """Where work is done. workers: processes on this machine, 1: this process itself; scheduler: address of a Dask
+    scheduler, or "" for this machine. InputError for fewer workers than one."""
+
+    workers: int = 1
+    scheduler: str = ""
+
+    def __post_init__(self):
+        if self.workers < 1:
+            raise InputError("--workers", f"{self.workers}", "1 or more")
+
+
+def check_place(place: Workplace) -> None:
+    """InputError where a cluster's scheduler does not answer, so that it is told before work begins."""
+    if place.scheduler:
+        with _cluster(place.scheduler):
+            pass
+
+
+def run(
+    tasks: Iterable[Task], work: Work, place: Workplace, cancelled: Callable[[], bool] | None = None,
+    spent: Callable[[Done], None] | None = None,
+) -> Iterator[tuple[object, object]]:
+    """(key, result) of every task, as they end, in any order; the result is `Failed` where `work` raises.
+
+    tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
+    processes can import by its name. spent: is told of each piece what it took. Raises
+    Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
+    away. Closing the iterator, or an error, ends what is still being done.
+    """
+    stop = cancelled or (lambda: False)
+    if place.scheduler:
+        with _cluster(place.scheduler) as client:
+            yield from _told(_spread(iter(tasks), work, _Cluster(client), stop), spent)
+    elif place.workers == 1:
+        yield from _told(_here(tasks, work, stop), spent)
+    else:
+        yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), spent)
+
+
+def _told(done: Iterator[tuple[object, Done]], spent) -> Iterator[tuple[object, object]]:
+    with contextlib.closing(done):
+        for key, one in done:
+            if spent is not None:
+                spent(one)
+            yield key, one.result
+
+
+def attempt(work: Work, arguments: tuple) -> Done:
+    """What `work` gives for `arguments`, or why it gives nothing. Errors are told as text, since not every error comes
+    through to another process. Raises Cancelled."""
+    begun = time.process_time()
+    try:
+        result = work(*arguments)
+    except Cancelled:
+        raise
+    except BeyondMocapError as error:
+        result = Failed(str(error))
+    except Exception as error:  # a fault of one piece must not cost the others
+        result = Failed(" ".join(f"{type(error).__name__}: {error}".split()))
+    return Done(result, peak_memory(), time.process_time() - begun)
+
+
+def peak_memory() -> float:
+    """MB that this process has needed at most; 0 where the system does not tell (Windows)."""
+    try:
+        import resource
+    except ImportError:
+        return 0.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
+
+
+def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Iterator[tuple[object, Done]]:
+    for key, arguments in tasks:
+        if stop():
+            raise Cancelled("cancelled")
+        yield key, attempt(work, arguments)
+
+
+def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[object, Done]]:
+    """The loop over one place's workers: keeps them busy, hands on what is done, and does again what was lost.
+
+    After a break all that was in hand is done again; after several the pieces go one by one, so that the one that ends
+    its worker is found.
+    """
+    again: deque[Task] = deque()
+    going: dict[Future, Task] = {}
+    breaks = 0
+    try:
+        while True:
+            alone = breaks >= _BREAKS and bool(again or going)
+            while len(going) < (1 if alone else place.room()) and (task := _next(again, tasks)) is not None:
+                try:
+                    going[place.submit(work, task[1])] = task
+                except BrokenExecutor:  # a worker ended while nobody looked
+                    again.appendleft(task)
+                    break
+            if not going and again:
+                breaks += 1
+                place.renew()
+                continue
+            if not going:
+                return
+            done, _ = wait(going, timeout=POLL, return_when=FIRST_COMPLETED)
+            if stop():
+                raise Cancelled("cancelled")
+            place.check(bool(done))
+            lost = []
+            for future in done:
+                task = going.pop(future)
+                if not _is_broken(future):
+                    yield task[0], _result(future)
+                elif alone:
+                    place.renew()
+                    yield task[0], Done(Failed("its worker process ended; is there too little memory?"))
+                else:
+                    lost.append(task)
+            if lost:
+                again.extend([*lost, *going.values()])
+                going.clear()
+                breaks += 1
+                place.renew()
+            elif not again and not going:
+                breaks = 0
+    finally:
+        place.close(going)
+
+
+def _next(again: deque[Task], tasks: Iterator[Task]) -> Task | None:
+    return again.popleft() if again else next(tasks, None)
+
+
+def _is_broken(future: Future) -> bool:
+    """Whether the place broke, not the work: here nobody else cancels what is in hand."""
+    return future.cancelled() or isinstance(future.exception(), (BrokenExecutor, CancelledError))
+
+
+def _result(future: Future) -> Done:
+    """What a future gives; a failure of the place rather than of the work is a failure of this piece."""
+    try:
+        return future.result()
+    except Exception as error:  # such as a result that cannot be sent
+        return Done(Failed(f"its worker gave no result ({' '.join(f'{type(error).__name__}: {error}'.split())[:200]})"))
+
+
+class _Processes:
+    """Processes of this machine."""
+
+    started: Executor | None = None
+    """The processes that this program has started last, and that may wait for work."""
+
+    def __init__(self, workers: int):
+        self._workers = workers
+        self._executor: Executor | None = None
+
+    def room(self) -> int:
+        """Pieces that may be in hand at once."""
+        return AHEAD * self._workers
+
+    def submit(self, work: Work, arguments: tuple) -> Future:
+        """Hands out a piece; processes that are still there from an earlier stage go on, with all that they hold.
+        BrokenExecutor where one of them has ended."""
+        if self._executor is None:
+            from joblib.externals.loky import get_reusable_executor
+
+            self._executor = get_reusable_executor(
+                self._workers, timeout=_IDLE, reuse=True, initializer=_follow, initargs=(os.getpid(),),
+                env={name: "1" for name in _THREADS},
+            )  # fmt: skip
+            _Processes.started = self._executor
+        return self._executor.submit(attempt, work, arguments)
+
+    def check(self, moved: bool) -> None:
+        """Processes here need no looking after: the executor tells when one ends."""
+
+    def renew(self) -> None:
+        """Other processes, where one has ended."""
+        self._end()
+
+    def close(self, going: Iterable[Future]) -> None:
+        """Ends the processes where they still work on something; else they wait for the next stage."""
+        if any(not future.done() for future in going):
+            self._end()
+
+    def _end(self) -> None:
+        executor, self._executor = self._executor, None
+        if executor is not None:
+            executor.shutdown(wait=True, kill_workers=True)
+
+
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+def _follow(parent: int) -> None:
+    """A worker answers no Ctrl-C, which a terminal sends to all processes of a command, and ends soon after the process
+    `parent` that started it, however that ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
+
+
+def ended() -> None:
+    """Ends the local processes that wait for more work."""
+    executor, _Processes.started = _Processes.started, None
+    if executor is not None:
+        executor.shutdown(wait=True, kill_workers=True)
+
+
+class _Cluster:
+    """The workers of a Dask cluster."""
+
+    def __init__(self, client):
+        self._client = client
+        self._executor = client.get_executor(pure=False)
+        self._looked, self._room, self._moved = -PATIENCE, AHEAD, time.monotonic()
+
+    def room(self) -> int:
+        """Pieces that may be in hand at once; workers may come and go."""
+        if time.monotonic() - self._looked > 1.0:
+            self._looked, threads = time.monotonic(), self._threads()
+            self._room = AHEAD * max(threads, 1)
+        return self._room
+
+    def submit(self, work: Work, arguments: tuple) -> Future:
+        """Hands out a piece. InputError where the scheduler is gone."""
+        try:
+            return self._executor.submit(attempt, work, arguments)
+        except Exception:  # a client without a scheduler tells it in many ways
+            return self.renew()
+
+    def check(self, moved: bool) -> None:
+        """Raises InputError where nobody has worked for long, since nobody is there."""
+        if moved or self._threads():
+            self._moved = time.monotonic()
+        elif time.monotonic() - self._moved > PATIENCE:
+            raise InputError("--scheduler", f"no worker for {PATIENCE:g} s", "some", "start 'dask worker ADDRESS'")
+
+    def renew(self) -> NoReturn:
+        """A cluster looks after its workers itself; what it loses, it loses with its scheduler. InputError."""
+        what = "start it and the command again; what is done is kept"
+        raise InputError("--scheduler", "the scheduler went away", "one that stays", what)
+
+    def close(self, going: Iterable[Future]) -> None:
+        """Takes back what nobody needs any more."""
+        for future in going:
+            future.cancel()
+
+    def _threads(self) -> int:
+        with contextlib.suppress(Exception):  # a scheduler that is gone answers in many ways
+            if self._client.status == "running":
+                return sum(worker["nthreads"] for worker in self._client.scheduler_info()["workers"].values())
+        return 0
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[object]:
+    """A client of the scheduler at `address`; InputError where none answers, or Dask is not installed."""
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise InputError(
+            "--scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
+            "pip install 'beyond-mocap[cluster]'",
+        ) from None
+    for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what is wrong is told here, in one line
+    try:
+        client = Client(address, timeout=_ANSWERS, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        found = f"{address} does not answer ({' '.join(str(error).split())[:120]})"
+        expected = "the address of a Dask scheduler, such as tcp://127.0.0.1:8786"
+        raise InputError("--scheduler", found, expected, "start one with 'dask scheduler'") from None
+    try:
+        yield client
+    finally:
+        with contextlib.suppress(Exception):  # a scheduler that is gone cannot be said goodbye to
+            client.close(timeout=2)

@@ -1,0 +1,129 @@
+"""Windows joined into one edit list: cut where two neighbours show the same frame of the same clip, so that nobody can
+tell where one ends; else at the cheapest transition that the overlap has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...library.features import FPS
+from ...library.library import Library
+from ...synthesis.plan import Plan
+from ...synthesis.resolve_plan import resolve_plan
+from ...synthesis.search.balance import balanced
+from ...synthesis.search.path_costs import PathCosts
+from ...synthesis.search.slots import AROUND
+from ...synthesis.search.wanted import build_order
+from .cut_plan import cut_plan
+from .library_clips import bound
+from .named_edit import CONTINUES, NamedEdit, NamedKey, chained, part, retabled, table
+from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
+from .searched import Piece, searched_library
+
+_APART = 4
+"""Frames that a transition keeps from other seams, so that it can be faded over."""
+
+_NEAR_SEAM, _NEAR_KEY = 10.0, 1000.0
+"""What a transition costs so close to another seam, and within the clip of a key moment."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Where two windows were joined: frame of the stretch, at the library's rate; whether both show the same there."""
+
+    frame: int
+    agreed: bool
+
+
+def spliced(
+    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = LAYOUT
+) -> tuple[PlayerEdit, tuple[Joint, ...]]:
+    """A player out of all of his windows, and how these were joined.
+
+    library: in which they were searched. plans: one per stretch, from which `units_of` made its windows; pieces: all of
+    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing.
+    """
+    stretches, joints = [], []
+    for number, plan in enumerate(plans):
+        plan = kept(plan)
+        mine = sorted((piece for piece in pieces if piece.stretch == number), key=lambda piece: piece.number)
+        _check(plan, mine)
+        edit, found = _joined(library, plan, mine)
+        begin = float(plan.track.times[0])
+        warnings = tuple(dict.fromkeys(line for piece in mine for line in piece.warnings))
+        short = tuple(
+            (begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
+            for piece in mine if piece.hurried is not None
+        )  # fmt: skip
+        stretches.append(Stretch(plan, edit, warnings, short))
+        joints += found
+    return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)
+
+
+def _check(plan: Plan, pieces: list[Piece]) -> None:
+    if not pieces or [piece.number for piece in pieces] != list(range(len(pieces))):
+        found = f"windows {', '.join(str(piece.number) for piece in pieces) or 'none'} of {plan.track.name}"
+        raise InputError("match", found, "all windows of a stretch", "search the others too")
+
+
+def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
+    """The edit list of a stretch, and where its windows were joined."""
+    clips = table([piece.edit for piece in pieces])
+    pieces = [replace(piece, edit=retabled(piece.edit, clips)) for piece in pieces]
+    joints = [_joint(library, plan, *pair) for pair in zip(pieces, pieces[1:])]
+    edges = [0, *(joint.frame for joint in joints), pieces[-1].first + len(pieces[-1].edit)]
+    parts, keys = [], []
+    for piece, low, high in zip(pieces, edges, edges[1:]):
+        parts.append(part(piece.edit, low - piece.first, high - piece.first))
+        keys += [key for key in piece.edit.keys if low <= _frame(plan, key) < high]
+    return chained(parts, keys), joints
+
+
+def _frame(plan: Plan, key: NamedKey) -> float:
+    """The frame of the stretch at which a key moment is played."""
+    moment = next(moment for moment in plan.timeline.keys if moment.time == key.time)
+    return (moment.in_force - float(plan.track.times[0])) * FPS
+
+
+def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
+    """Where one window is left for the next: nearest to the edge between them where both agree."""
+    low, high, edge = after.first, before.first + len(before.edit), after.own[0]
+    (clip, frame), (other, there) = (
+        tuple(values[low - piece.first : high - piece.first] for values in piece.edit.frames())
+        for piece in (before, after)
+    )
+    same = (clip == other) & (np.abs(frame - there) < CONTINUES)
+    at = np.flatnonzero(same[1:] & same[:-1]) + 1
+    if len(at):
+        return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
+    return Joint(low + 1 + int(np.argmin(_costs(library, plan, before, after, low, high))), False)
+
+
+def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
+    """(high - low - 1,) what it costs to leave one window for the next at frames low + 1 .. high."""
+    library = searched_library(library, plan)
+    begin = float(plan.track.times[0])
+    here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
+    order = build_order(library, resolve_plan(here, library, touches_solved=True))
+    leaves, enters = (bound(library, part(p.edit, low - p.first, high - p.first)) for p in (before, after))
+    costs = PathCosts(library, order, balanced(plan.alpha))
+    step = np.gradient(leaves.frame)
+    step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
+    terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
+    cost = np.diagonal(sum(values for _, values in terms)).copy()
+    at = np.arange(1, high - low)
+    for seam in (*leaves.seams, *enters.seams):
+        cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))
+    for key in (*before.edit.keys, *after.edit.keys):
+        rate = FPS / library.clips[_clip(library, before.edit.clips[key.clip])].motion.fps
+        entry, leave = (max(AROUND, seconds * rate) for seconds in (key.frame - key.start, key.end - key.frame))
+        middle = _frame(plan, key) - low
+        cost += _NEAR_KEY * ((at > middle - entry) & (at < middle + leave))
+    return cost
+
+
+def _clip(library: Library, name: tuple[str, bool]) -> int:
+    return next(number for number, clip in enumerate(library.clips) if (clip.path, clip.mirrored) == name)

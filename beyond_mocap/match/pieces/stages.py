@@ -1,0 +1,269 @@
+"""The stages of a match that are spread over workers: search, everybody kept apart, figures. What is done already is
+found by the digest of all that it depends on, so that a run goes on where another ended, and after an edit makes only
+what the edit touches."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...annotation import Timeline
+from ...base.errors import BeyondMocapError, told_time
+from ..take_npz import write_player
+from ...files.tables import plain
+from ...files.whole import atomic_write
+from ...library.library import Library
+from ..crowd.correction import joined
+from ...motion.track.ball_path import BallPath
+from .content_digest import digest_of
+from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
+from ..folder import MatchFolder
+from ..crowd.kept_crowd import keep_parts, kept_parts
+from .kept_pieces import keep_piece, kept_piece
+from ..order import FORM, MatchOrder
+from ..parts import Part
+from ..player_edit import PlayerEdit
+from .pool import Failed, Workplace, run
+from .searched import Piece
+from .splice import spliced
+from ..state import MatchState
+from .units import units_of
+from .work import Finish, finish_player, part_crowd, search_unit
+from .workplace_library import LibrarySource
+
+SEARCH, CROWD = "search", "crowd"
+"""The kinds of pieces that are kept."""
+
+Report = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Job:
+    """What all stages share. source: the library as workers read it; library: as this process has it; place: who works;
+    report(fraction of the stage, text); cancelled()."""
+
+    order: MatchOrder
+    folder: MatchFolder
+    state: MatchState
+    source: LibrarySource
+    library: Library
+    place: Workplace
+    report: Report
+    cancelled: Callable[[], bool] | None = None
+
+    def told(self, report: Report) -> Job:
+        """The same, telling another."""
+        return replace(self, report=report)
+
+    def named(self, *values: object) -> str:
+        """The name of a piece of work that depends on the library and on `values`."""
+        return digest_of(FORM, self.source.key, *values)
+
+
+def _spread(job: Job, tasks, work, stage: str) -> Iterator[tuple]:
+    """(key, result) of a stage's tasks (`pool.run`)."""
+    return run(tasks, work, job.place, job.cancelled, job.state.spent(stage))
+
+
+def search(job: Job, parts: Sequence[Part]) -> dict[str, PlayerEdit]:
+    """Everybody's edit list, by id, each written as soon as it is there; who fails is told in the state."""
+    return _Search(job, parts).done()
+
+
+class _Search:
+    """The windows of all players: those that are found again, and those that have to be searched."""
+
+    def __init__(self, job: Job, parts: Sequence[Part]):
+        self._job, self._parts = job, {part.role.player.id: part for part in parts if part.plans}
+        self._found: dict[str, list[Piece]] = {player: [] for player in self._parts}
+        self._names: set[str] = set()
+        self._edits: dict[str, PlayerEdit] = {}
+        self._count = 0
+        order = job.order
+        for player, part in self._parts.items():
+            units = sum(len(units_of(_bare(plan), 0, order.window, order.overlap)) for plan in part.plans)
+            job.state.players[player]["units"] = units
+            self._count += units
+
+    def done(self) -> dict[str, PlayerEdit]:
+        """Searches what is missing."""
+        job = self._job
+        for (player, name), result in _spread(job, self._missing(), search_unit, SEARCH):
+            if isinstance(result, Failed):
+                self._fail(player, result.reason)
+                continue
+            path = job.folder.place(SEARCH, name)
+            keep_piece(path, result)
+            self._take(player, kept_piece(path) or result)  # as a run that finds it would have it
+        job.folder.forget(SEARCH, self._names)
+        return {player: self._edits[player] for player in self._parts if player in self._edits}
+
+    def _missing(self) -> Iterator[tuple[tuple[str, str], tuple]]:
+        job = self._job
+        for player, part in self._parts.items():
+            for number, plan in enumerate(part.plans):
+                for unit in units_of(plan, number, job.order.window, job.order.overlap):
+                    if self._failed(player):
+                        break
+                    name = job.named(replace(unit, plan=replace(unit.plan, library="")))
+                    self._names.add(name)
+                    found = kept_piece(job.folder.place(SEARCH, name))
+                    if found is not None:
+                        self._take(player, found)
+                    else:
+                        yield (player, name), (job.source, unit)
+
+    def _take(self, player: str, piece: Piece) -> None:
+        """One more window; the last one makes the player's edit list."""
+        job, mine = self._job, self._found[player]
+        mine.append(piece)
+        if self._failed(player):
+            return
+        job.state.counted(player)
+        done = sum(map(len, self._found.values()))
+        job.report(done / self._count, f"Searching: {done} of {self._count} windows")
+        if len(mine) == job.state.players[player]["units"]:
+            try:
+                edit, joints = spliced(job.library, self._parts[player].plans, mine)
+            except BeyondMocapError as error:
+                return self._fail(player, str(error))
+            self._edits[player] = edit
+            file = job.folder.of(self._parts[player].file, "take.npz")
+            write_player(file, edit)
+            agreed = sum(joint.agreed for joint in joints)
+            job.state.player(player, status="searched", take=file.name, joints=[len(joints), agreed],
+                             search_s=round(sum(piece.seconds for piece in mine), 3))  # fmt: skip
+
+    def _fail(self, player: str, reason: str) -> None:
+        if not self._failed(player):
+            self._job.state.player(player, status="failed", reason=reason)
+
+    def _failed(self, player: str) -> bool:
+        return self._job.state.players[player]["status"] == "failed"
+
+
+def _bare(plan):
+    """The plan for counting its windows: they depend on its track alone."""
+    return replace(plan, timeline=Timeline(), solved=None, solve_touches=False)
+
+
+def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
+    """What the whole span says of each player, by id: windows of everybody on the match's clock."""
+    players, names = list(edits), {}
+    windows = _windows(span, min(job.order.window, LONGEST), job.order.fps)
+    found: dict[int, tuple[CrowdPart, ...]] = {}
+
+    def missing():
+        for number, (start, end) in enumerate(windows):
+            cut = tuple(cut_edit(edits[player], start - BEYOND, end + BEYOND) for player in players)
+            names[number] = job.named(start, end, _unnamed(cut))
+            kept = kept_parts(job.folder.place(CROWD, names[number]))
+            if kept is not None and len(kept) == len(players):
+                found[number] = kept
+            else:
+                yield number, (job.source, cut, start, end)
+
+    for number, result in _spread(job, missing(), part_crowd, CROWD):
+        if isinstance(result, Failed):
+            start, end = windows[number]
+            when = f"{told_time(start)}-{told_time(end)} s"
+            job.state.told["notes"].append(f"{when}: bodies are not kept apart: {result.reason}")
+            continue
+        keep_parts(job.folder.place(CROWD, names[number]), result)
+        found[number] = result
+        job.report(len(found) / len(windows), f"Keeping bodies apart: {len(found)} of {len(windows)} windows")
+    job.folder.forget(CROWD, names.values())
+    rows = [(found[number], windows[number]) for number in sorted(found)]
+    return {player: _whole([(parts[place], window) for parts, window in rows], job.order.fps)
+            for place, player in enumerate(players)}  # fmt: skip
+
+
+def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple[float, float]]:
+    """(start, end) s of windows over the span, on frames and on the grid."""
+    numbers = range(int(np.floor(span[0] / window)) + 1, int(np.ceil(span[1] / window)))
+    edges = [span[0], *(number * window for number in numbers), span[1] + 1.0 / fps]
+    return list(zip(edges, edges[1:]))
+
+
+def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
+    """Edit lists without the library's place, on which their motion does not depend."""
+    def bare(stretch):
+        return replace(stretch, plan=replace(stretch.plan, library=""))
+
+    return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
+
+
+def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
+    """One player's windows as one."""
+    if not parts:
+        none = np.zeros(0)
+        return CrowdPart(in_turn([], fps), none.astype(int), none, 0.0, none.astype(int), np.zeros((0, 3)))
+    cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
+    only = [one for one, _ in parts]
+    arrays = {name: np.concatenate([getattr(one, name) for one in only])
+              for name in ("frames", "depth", "led_frames", "led")}  # fmt: skip
+    return CrowdPart(joined(cores, round(REACH * fps)), before=max(one.before for one in only), **arrays)
+
+
+def finish(
+    job: Job, parts: Sequence[Part], edits: dict[str, PlayerEdit], crowd: dict[str, CrowdPart], ball: BallPath
+) -> None:
+    """Everybody's files: the edit list with its correction, and, where asked for, report, provenance and BVH."""
+    mine = {part.role.player.id: part for part in parts if part.role.player.id in edits}
+    names: dict[str, str] = {}
+    done = 0
+
+    def missing():
+        nonlocal done
+        for player, part in mine.items():
+            edit = replace(edits[player], correction=crowd[player].correction)
+            write_player(job.folder.of(part.file, "take.npz"), edit)
+            order = Finish(edit, part.role.measured, ball, crowd[player].frames, crowd[player].depth,
+                           job.order.figures, job.order.bvh)  # fmt: skip
+            names[player] = job.named(replace(order, edit=_unnamed([edit])[0]), part.role.player, part.role.notes)
+            if _is_finished(job, part, names[player]):
+                done += 1
+            else:
+                yield player, (job.source, order)
+
+    for player, result in _spread(job, missing(), finish_player, "figures"):
+        if isinstance(result, Failed):
+            job.state.player(player, status="failed", reason=result.reason)
+            continue
+        files = _write(job, mine[player], result, names[player])
+        done += 1
+        job.report(done / len(mine), f"Figures: {done} of {len(mine)} players")
+        job.state.player(player, status="done", **files)
+
+
+def _is_finished(job: Job, part: Part, name: str) -> bool:
+    """Whether an earlier run wrote this player's files; then they are told again."""
+    endings = {"report": "report.json", "provenance": "provenance.csv"} if job.order.figures else {}
+    endings |= {"bvh": "bvh"} if job.order.bvh else {}
+    files = {kind: job.folder.of(part.file, ending) for kind, ending in endings.items()}
+    player = part.role.player.id
+    if job.state.players[player].get("finished") != name or not all(path.is_file() for path in files.values()):
+        return False
+    job.state.player(player, status="done", **{kind: path.name for kind, path in files.items()})
+    return True
+
+
+def _write(job: Job, part: Part, made, name: str) -> dict[str, str]:
+    """Writes a player's files; their names for his row. What an earlier run said of them holds no longer."""
+    job.state.player(part.role.player.id, finished=None)
+    told = {"finished": name}
+    for ending, content in made.files.items():
+        path = job.folder.of(part.file, ending)
+        atomic_write(path, content)
+        told.setdefault(ending.rpartition(".")[2] if ending.endswith("bvh") else ending.partition(".")[0], path.name)
+    if made.report is not None:
+        path, player = job.folder.of(part.file, "report.json"), part.role.player
+        who = {"id": player.id, "team": player.team, "number": player.number, "name": player.name}
+        took = {**made.report["seconds"], "search": job.state.players[player.id]["search_s"]}
+        whole = {**made.report, **who, "seconds": took, "warnings": [*made.report["warnings"], *part.role.notes]}
+        atomic_write(path, json.dumps(plain(whole), indent=1, ensure_ascii=False, allow_nan=False) + "\n")
+        told["report"] = path.name
+    return told

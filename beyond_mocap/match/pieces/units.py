@@ -1,0 +1,107 @@
+"""A player's plan cut into windows of work, each of which any process can search by itself.
+
+Windows lie on a fixed grid of the match's clock, so that the same second falls into the same window for everybody, and
+overlap, so that neighbours can be joined where both have found the same (`splice`). They begin and end with whole slots
+of the search, counted from the stretch's first frame: in the overlap both are offered the same footage at the same
+frames.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...library.features import FPS
+from ...synthesis.plan import Plan
+from ...synthesis.search.offer import SLOT
+from .cut_plan import cut_plan
+from ..player_edit import kept
+
+WINDOW = 300.0
+"""Seconds of a window's own part."""
+
+OVERLAP = 12.0
+"""Seconds that two neighbours share: two thirds before the edge between them, which the later one needs to find onto
+the way of who comes from further back, and one third behind it."""
+
+RUN_IN = 2.0 / 3.0
+"""Share of the overlap that lies before the edge."""
+
+_SHORTEST = 0.25
+"""Share of a window below which the last or the first one goes to its neighbour."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """One player's window of work, with all that is needed to search it.
+
+    player: his id. stretch: which of his stretches on the pitch. number: of the window within the stretch. start, end:
+    s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as
+    `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
+    end) frames of its own part, counted in the same way.
+    """
+
+    player: str
+    number: int
+    start: float
+    end: float
+    plan: Plan
+    stretch: int = 0
+    first: int = 0
+    own: tuple[int, int] = (0, 0)
+
+
+def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: float = OVERLAP) -> tuple[Unit, ...]:
+    """The windows of one stretch of a player: `plan`, whose track's name is his id.
+
+    window: seconds; their edges are at multiples of it on the match's clock, to the nearest slot. overlap: seconds that
+    two neighbours share. Key moments are moved to the touches they mean before the plan is cut. InputError
+    for a window or an overlap that leaves no sense.
+    """
+    _check(window, overlap)
+    plan = kept(plan)
+    begin, count = float(plan.track.times[0]), frame_count(plan)
+    edges = window_edges(begin, count, window)
+    before, behind = (SLOT * max(1, round(share * overlap * FPS / SLOT)) for share in (RUN_IN, 1.0 - RUN_IN))
+    units = []
+    for number, (low, high) in enumerate(zip(edges, edges[1:])):
+        first, end = max(0, low - before), min(count, high + behind)
+        part = cut_plan(plan, begin + first / FPS, begin + (end - 1) / FPS)
+        times = begin + low / FPS, begin + high / FPS
+        units.append(Unit(plan.track.name, number, *times, part, stretch, first, (low, high)))
+    return tuple(units)
+
+
+def layout_edges(begin: float, count: int, fps: float, window: float) -> list[int]:
+    """Frames, at `fps`, between which the windows lie in which a stretch is laid out: as `window_edges`, but to the
+    nearest frame, so that a part of a stretch has the same ones."""
+    return _edges(begin, count, fps, window, 1)
+
+
+def frame_count(plan: Plan, fps: float = FPS) -> int:
+    """Frames of the plan's track at `fps`, as `motion.track.sample` counts them."""
+    return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
+
+
+def window_edges(begin: float, count: int, window: float) -> list[int]:
+    """Frames, at the library's rate, between which the windows of a stretch lie: it begins at `begin` s and has `count`
+    frames. A first or last window that would be short goes to its neighbour."""
+    return _edges(begin, count, FPS, window, SLOT)
+
+
+def _edges(begin: float, count: int, fps: float, window: float, step: int) -> list[int]:
+    """0, the multiples of `step` frames nearest to multiples of `window` s on the match's clock, and count."""
+    end = begin + count / fps
+    numbers = range(int(np.floor(begin / window)) + 1, int(np.ceil(end / window)))
+    inner = [step * round((number * window - begin) * fps / step) for number in numbers]
+    least = _SHORTEST * window * fps
+    return [0, *(edge for edge in inner if least <= edge <= count - least), count]
+
+
+def _check(window: float, overlap: float) -> None:
+    if not 5.0 <= window <= 3600.0:
+        raise InputError("--window", f"{window:g} s", "5 to 3600 s")
+    if not 1.0 <= overlap <= window / 2.0:
+        raise InputError("--overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")

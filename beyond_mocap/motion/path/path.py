@@ -1,0 +1,109 @@
+"""Paths: smooth curves in space with a parameter, that a motion is told relative to and can be laid on (Path editing
+§3.1).
+
+A path lies on the ground under the body. Its parameter is seconds where it was fitted to a motion, and anything that
+rises along it where it was drawn; `arc_length` turns it into metres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.errors import InputError
+from ..skeleton import frozen_array
+
+
+class Path:
+    """A curve in space, twice continuously differentiable, also over the seam where it is closed.
+
+    domain: its first and last parameter. breaks: (K,) rising parameters, the domain's ends among them, between which it
+    is one polynomial. closed: whether it ends where it begins; then parameters beyond the domain go round, else they
+    are taken to its ends.
+    """
+
+    domain: tuple[float, float]
+    breaks: np.ndarray
+    closed: bool = False
+
+    def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
+        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... how they change with the
+        parameter."""
+        raise NotImplementedError
+
+    def _inside(self, u: np.ndarray) -> np.ndarray:
+        """Parameters (N,) within the domain."""
+        low, high = self.domain
+        u = np.asarray(u, dtype=float)
+        return low + (u - low) % (high - low) if self.closed else np.clip(u, low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class PolynomialPath(Path):
+    """One polynomial over the whole domain, as a series of Legendre polynomials, which keeps high degrees exact.
+
+    coefficients: (degree + 1, 3) metres. domain: see Path.
+    """
+
+    coefficients: np.ndarray
+    domain: tuple[float, float]
+
+    def __post_init__(self):
+        object.__setattr__(self, "coefficients", frozen_array(self.coefficients))
+
+    @property
+    def breaks(self) -> np.ndarray:
+        return np.linspace(*self.domain, len(self.coefficients))  # one would do: its bends ask for as many
+
+    def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
+        low, high = self.domain
+        scaled = (2.0 * self._inside(u) - low - high) / (high - low)
+        legendre = np.polynomial.legendre
+        series = self.coefficients if derivative == 0 else legendre.legder(self.coefficients, derivative)
+        return legendre.legval(scaled, series).T * (2.0 / (high - low)) ** derivative
+
+
+@dataclass(frozen=True, eq=False)
+class SplinePath(Path):
+    """A B-spline.
+
+    knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3
+    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` control points repeat the
+    first.
+    """
+
+    knots: np.ndarray
+    coefficients: np.ndarray
+    degree: int = 3
+    closed: bool = False
+
+    def __post_init__(self):
+        knots, coefficients = frozen_array(self.knots), frozen_array(self.coefficients)
+        if len(knots) != len(coefficients) + self.degree + 1 or self.degree < 1:
+            raise InputError(
+                "path", f"{len(knots)} knots, {len(coefficients)} control points, degree {self.degree}",
+                "as many knots as control points + degree + 1",
+            )
+        object.__setattr__(self, "knots", knots)
+        object.__setattr__(self, "coefficients", coefficients)
+
+    @cached_property
+    def domain(self) -> tuple[float, float]:
+        return float(self.knots[self.degree]), float(self.knots[-self.degree - 1])
+
+    @cached_property
+    def breaks(self) -> np.ndarray:
+        return np.unique(self.knots[self.degree : len(self.knots) - self.degree])
+
+    @cached_property
+    def _spline(self):
+        from scipy.interpolate import BSpline
+
+        return BSpline(self.knots, self.coefficients - self.coefficients[0], self.degree)
+
+    def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
+        # about the first control point: far from the origin derivatives would lose their digits
+        values = self._spline(self._inside(u), derivative)
+        return values if derivative else values + self.coefficients[0]

@@ -1,0 +1,1 @@
+"""A motion on other bones: anatomy, neutral stance, bone maps."""

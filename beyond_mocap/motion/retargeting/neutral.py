@@ -1,0 +1,241 @@
+"""The neutral stance of any humanoid skeleton: upright, facing +X, legs straight down, arms hanging, soles flat.
+
+Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever
+is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all of
+them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.vectors import cross, unit_vectors
+from .. import quaternion
+from ...base.arctangent import arctan2
+from ..humanoid import Humanoid, Limb, heading_from_positions, identify
+from ..motion import Motion, forward_kinematics, local_rotations, pose_kinematics
+from ..skeleton import Skeleton, frozen_array
+from .structure import below
+
+_UP = np.array([0.0, 0.0, 1.0])
+_DOWN = -_UP
+# a collar bone that lies within this angle of sideways is left as the skeleton has it
+_COLLAR_TOLERANCE = np.radians(40.0)
+# a spine this near to upright, a toe this near to level is left as it is
+_NEARLY = np.radians(25.0)
+# legs that hang at least so steeply stand
+_SPLAYED = np.radians(40.0)
+# slope of the line ankle-ball of a flat foot, and of a foot joint that hangs on nothing
+_SOLE_SLOPE = np.radians(22.0)
+# height of the ball of the foot (the toe joint) above the ground, share of the leg's length
+_BALL_HEIGHT = 0.022
+
+
+@dataclass(frozen=True, eq=False)
+class Neutral:
+    """A skeleton in its neutral stance.
+
+    rotations (J, 4): world rotation of each joint. positions (J, 3): metres, the ground at z = 0, mid-hip above the
+    origin. leg: length of thigh plus shank, metres. ankle_height: metres. ball (2, 3): from ankle to toe joint (left,
+    right) with the sole flat. heel: metres from the ankle's foot point back to the heel. tip: metres from toe joint to
+    toe tip."""
+
+    skeleton: Skeleton
+    rotations: np.ndarray
+    positions: np.ndarray
+    leg: float
+    ankle_height: float
+    ball: np.ndarray
+    heel: float
+    tip: float
+
+
+def neutral_stance(skeleton: Skeleton, example: Motion | None = None) -> Neutral:
+    """The neutral stance of `skeleton`.
+
+    example: a recording on the same skeleton; its most upright frames then say how bones are twisted about their own
+    length and how a flat foot lies, which bone directions alone leave open. Wanted where made and recorded motion are
+    to be blended, and where a skeleton's rest pose is no standing one (LAFAN1, Bandai). Raises InputError where hips or
+    legs cannot be found."""
+    body = identify(skeleton)
+    world = np.array(_start(skeleton, body, example))
+    slopes = [_sole_slope(skeleton, limb, world, example) for limb in (body.left, body.right)]
+    _straighten(skeleton, body, world, slopes)
+    local = local_rotations(skeleton, world)
+    positions, _ = pose_kinematics(skeleton, np.zeros((1, 3)), local[None])
+    return _measure(skeleton, body, world, positions[0])
+
+
+def rests_upright(skeleton: Skeleton) -> bool:
+    """Whether the rest pose (no joint rotated) stands: its spine is upright and its legs hang, if splayed."""
+    body = identify(skeleton)
+    places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
+    top = next(j for j in (body.neck, body.head, body.chest, body.hips) if j is not None)
+    bones = [(body.hips, top, _UP, _NEARLY)]
+    bones += [(leg.upper_leg, leg.foot, _DOWN, _SPLAYED) for leg in (body.left, body.right)]
+    return all(
+        unit_vectors(places[0, low] - places[0, high], -way) @ way > np.cos(most) for high, low, way, most in bones
+    )
+
+
+def _start(skeleton: Skeleton, body: Humanoid, example: Motion | None) -> np.ndarray:
+    """World rotations (J, 4) to begin with, facing +X: the example's upright frames, or the rest pose set upright."""
+    if example is not None:
+        return _mean_upright(skeleton, body, example)
+    places, _ = pose_kinematics(skeleton, np.zeros((1, 3)), quaternion.identity(1, len(skeleton)))
+    places = places[0]
+    across = places[body.left.upper_leg] - places[body.right.upper_leg]
+    top = next(j for j in (body.neck, body.head, body.chest, body.hips) if j is not None)
+    up = places[top] - places[body.hips]
+    if np.linalg.norm(up) < 1e-6:
+        up = places[body.hips] - 0.5 * (places[body.left.foot] + places[body.right.foot])
+    left = unit_vectors(across, np.array([0.0, 1.0, 0.0]))
+    if unit_vectors(up, _UP)[2] > np.cos(_NEARLY):
+        # a skeleton that rests upright keeps its own posture
+        left, up = unit_vectors(left * [1.0, 1.0, 0.0], left), _UP
+    up = unit_vectors(up - np.dot(up, left) * left, _UP)
+    frame = quaternion.from_matrix(np.stack([cross(left, up), left, up], axis=-1))
+    return np.broadcast_to(quaternion.inverse(frame), (len(skeleton), 4))
+
+
+def _mean_upright(skeleton: Skeleton, body: Humanoid, example: Motion) -> np.ndarray:
+    """Mean world rotations (J, 4) over the tenth of the frames that look most like standing, each turned to face +X."""
+    places, world = forward_kinematics(example)
+    score = _uprightness(body, places)
+    chosen = np.argsort(-score, kind="stable")[: max(len(score) // 10, 1)]
+    turn = quaternion.about_up(-heading_from_positions(skeleton, places[chosen]))
+    turned = quaternion.multiply(turn[:, None], world[chosen])
+    alike = np.sign(np.sum(turned * turned[:1], axis=-1, keepdims=True))
+    return quaternion.normalized(np.sum(turned * np.where(alike == 0.0, 1.0, alike), axis=0))
+
+
+def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
+    """How much each frame (T,) looks like standing: limbs that hang, a head that is high."""
+    score = np.zeros(len(places))
+    for limb in (body.left, body.right):
+        for high, low in (
+            (limb.upper_leg, limb.lower_leg),
+            (limb.lower_leg, limb.foot),
+            (limb.upper_arm, limb.lower_arm),
+        ):
+            if high is not None and low is not None:
+                score += unit_vectors(places[:, low] - places[:, high], _DOWN) @ _DOWN
+    return score
+
+
+def _straighten(skeleton: Skeleton, body: Humanoid, world: np.ndarray, slopes: list[float]) -> None:
+    """Turn limbs in `world` (J, 4), parents first, each with all that hangs on it, on the short way."""
+    for limb, side, slope in ((body.left, 1.0, slopes[0]), (body.right, -1.0, slopes[1])):
+        if limb.shoulder is not None and limb.upper_arm is not None:
+            sideways = np.array([0.0, side, 0.0])
+            if _angle(skeleton, world, limb.shoulder, limb.upper_arm, sideways) > _COLLAR_TOLERANCE:
+                _point(skeleton, world, limb.shoulder, limb.upper_arm, sideways)
+        for high, low in ((limb.upper_arm, limb.lower_arm), (limb.lower_arm, limb.hand), (limb.hand, None)):
+            if high is not None:
+                _point(skeleton, world, high, low, _DOWN)
+        _point(skeleton, world, limb.upper_leg, limb.lower_leg, _DOWN)
+        _point(skeleton, world, limb.lower_leg, limb.foot, _DOWN)
+        _flatten_foot(skeleton, world, limb, slope)
+
+
+def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Motion | None) -> float:
+    """How steeply, radians, the line from ankle to toe joint falls while the sole is flat.
+
+    In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that is
+    no standing foot.
+    """
+    if example is not None and limb.toe is not None:
+        places, _ = forward_kinematics(example)
+        ankle = places[:, limb.foot]
+        bones = places[:, limb.toe] - ankle
+        low = ankle[:, 2] <= np.quantile(ankle[:, 2], 0.25)
+        slope = float(np.median(arctan2(-bones[low, 2], np.hypot(bones[low, 0], bones[low, 1]))))
+        return float(np.clip(slope, np.radians(5.0), np.radians(50.0)))
+    direction = _direction(skeleton, world, limb.foot, limb.toe)
+    slope = float(np.arctan2(-direction[2], np.hypot(direction[0], direction[1])))
+    return slope if direction[0] > 0.5 and np.radians(5.0) < slope < np.radians(50.0) else _SOLE_SLOPE
+
+
+def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: float) -> None:
+    _point(skeleton, world, limb.foot, limb.toe, np.array([np.cos(slope), 0.0, -np.sin(slope)]))
+    ahead = np.array([1.0, 0.0, 0.0])
+    if limb.toe is not None and _has_tip(skeleton, limb.toe):
+        if _angle(skeleton, world, limb.toe, None, ahead) > _NEARLY:
+            _point(skeleton, world, limb.toe, None, ahead)
+
+
+def _has_tip(skeleton: Skeleton, joint: int) -> bool:
+    return joint in skeleton.end_parents and np.linalg.norm(_tip(skeleton, joint)) > 1e-4
+
+
+def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
+    return skeleton.end_offsets[skeleton.end_parents.index(joint)]
+
+
+def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None) -> np.ndarray:
+    """World direction (3,) of the bone from `joint` to `child` (or to its tip, or its parent's bone going on)."""
+    if child is not None:
+        return unit_vectors(_world_offset(skeleton, world, joint, child), _DOWN)
+    offset = _tip(skeleton, joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
+    return unit_vectors(quaternion.rotate(world[joint], offset), _DOWN)
+
+
+def _world_offset(skeleton: Skeleton, world: np.ndarray, joint: int, below: int) -> np.ndarray:
+    """From `joint` to a joint `below` it, metres, world: (3,)."""
+    total = np.zeros(3)
+    while below != joint:
+        total = total + quaternion.rotate(world[skeleton.parents[below]], skeleton.offsets[below])
+        below = skeleton.parents[below]
+    return total
+
+
+def _angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, wanted: np.ndarray) -> float:
+    return float(np.arccos(np.clip(np.dot(_direction(skeleton, world, joint, child), wanted), -1.0, 1.0)))
+
+
+def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, wanted: np.ndarray) -> None:
+    """Turn `joint` and all below it so that its bone points along `wanted`; half a turn is made about the body's X."""
+    direction = _direction(skeleton, world, joint, child)
+    turn = quaternion.between(direction, wanted)
+    if np.dot(direction, wanted) < -0.999:
+        turn = quaternion.about_axis(np.array([1.0, 0.0, 0.0]), np.pi)
+    for other in below(skeleton.parents, joint):
+        world[other] = quaternion.multiply(turn, world[other])
+
+
+def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.ndarray) -> Neutral:
+    limbs = (body.left, body.right)
+    legs = [
+        np.linalg.norm(places[limb.lower_leg] - places[limb.upper_leg])
+        + np.linalg.norm(places[limb.foot] - places[limb.lower_leg])
+        for limb in limbs
+    ]
+    leg = float(np.mean(legs))
+    ball = np.array([_ball(places, limb, leg) for limb in limbs])
+    tips = [
+        np.linalg.norm(_tip(skeleton, limb.toe))
+        for limb in limbs
+        if limb.toe is not None and _has_tip(skeleton, limb.toe)
+    ]
+    middle = 0.5 * (places[body.left.upper_leg] + places[body.right.upper_leg])
+    ankle_height = float(np.mean(-ball[:, 2])) + _BALL_HEIGHT * leg
+    ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height
+    positions = places - np.array([middle[0], middle[1], ground])
+    return Neutral(
+        skeleton,
+        frozen_array(world),
+        frozen_array(positions),
+        leg,
+        ankle_height,
+        frozen_array(ball),
+        0.065 * leg,
+        float(np.mean(tips)) if tips else 0.075 * leg,
+    )
+
+
+def _ball(places: np.ndarray, limb: Limb, leg: float) -> np.ndarray:
+    """From ankle to ball of the foot (3,), metres; a usual one where the skeleton has no toe joint."""
+    if limb.toe is None:
+        return leg * np.array([0.155, 0.0, -0.065])
+    return places[limb.toe] - places[limb.foot]

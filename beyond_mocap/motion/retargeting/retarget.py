@@ -1,0 +1,270 @@
+"""The same motion on other bones, whatever the rest poses of the two skeletons are.
+
+Per joint the world turn of the *segment* is carried over (see `anatomy`), so every bone points and is twisted as the
+source's: W' = W F F'^-1, with F and F' the segment's axes in the source's and the target's joint. Spines and necks of
+other lengths share the bend by arc length. Then size: everything on the ground is scaled by the ratio s of leg lengths
+(thigh plus shank), with the ankle's own height kept,
+
+    x' = s x,   z' = floor + a' + s (z - floor - a),
+
+for the middle between the hip joints and for both ankles, which the target's legs reach by two-bone inverse kinematics
+with the knees pointing where the source's point. Travel is scaled with the legs, so a foot that stands still goes on
+standing still; where places count (a pitch, a ball) travel is kept instead, x' = x, and the legs take longer or shorter
+steps than their own. Joints that a skeleton lacks go with the segment that carries them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ...base.vectors import unit_vectors
+from .. import limb, quaternion
+from .anatomy import Anatomy, head_chain, spine_shares, study
+from .bone_map import Pairs, pair
+from ..humanoid import Limb
+from ..motion import Motion, forward_kinematics, local_rotations
+from ..skeleton import Skeleton
+
+_SOFT = 0.01  # m below full length from where a limb eases
+_LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
+_CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower_arm", "toe": "foot"}
+# two rigs are the same, axes and all, when their bones point the same way in their rest pose within this angle
+_SAME_RIG = np.cos(np.radians(12.0))
+_TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+class Retargeter:
+    """Carries recordings of one rig to another, at their own rate: both are studied once.
+
+    Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
+    gives the motion back.
+    """
+
+    def __init__(
+        self,
+        sample: Motion,
+        skeleton: Skeleton,
+        bone_map: dict[str, str] | str | Path | None = None,
+        *,
+        example: Motion | None = None,
+        standing: np.ndarray | None = None,
+        example_standing: np.ndarray | None = None,
+        keeps_travel: bool = False,
+    ):
+        """sample: frames of the recordings (their order does not matter).
+
+        bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`bone_map.load`);
+        pairs in it go before those found by names and structure. example: a recording on `skeleton`, which tells how
+        its rig twists its bones and holds its trunk; without it the rest pose does. standing, example_standing (T, 2)
+        bool: left and right foot on the ground in `sample` and in `example`, which tells how soles lie; without it low
+        feet count as standing. keeps_travel: footprints and the way over the ground stay where they are, whatever the
+        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint.
+        """
+        self.keeps_travel = keeps_travel
+        self.pairs = pair(sample, skeleton, bone_map, example)
+        self.source = study(sample.skeleton, self.pairs.source, sample, standing)
+        same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
+        if same:  # its own recording says best how the rig is used: this very skeleton gets this very motion
+            example, example_standing = replace(sample, skeleton=skeleton), standing
+        self.target = study(skeleton, self.pairs.target, example, example_standing)
+
+    def carry(self, motion: Motion) -> Motion:
+        """`motion`, a recording of the sample's skeleton, on the other skeleton."""
+        return _Transfer(motion, self.source, self.target, self.pairs, self.keeps_travel).motion()
+
+
+def _same_rig(a: Skeleton, b: Skeleton) -> bool:
+    """Whether two skeletons share names, tree and axes, and differ in lengths only."""
+    if a.names != b.names or a.parents != b.parents:
+        return False
+    lengths = np.linalg.norm(a.offsets, axis=1) * np.linalg.norm(b.offsets, axis=1)
+    agree = np.sum(a.offsets * b.offsets, axis=1) >= _SAME_RIG * lengths
+    return bool(np.all(agree | (lengths < 1e-3)))
+
+
+class _Transfer:
+    """One motion on its way from `source` to `target`."""
+
+    def __init__(self, motion: Motion, source: Anatomy, target: Anatomy, pairs: Pairs, keeps_travel: bool = False):
+        self.fps, self.source, self.target, self.pairs = motion.fps, source, target, pairs
+        self.places, self.world = forward_kinematics(motion)
+        self.scale = target.leg / source.leg
+        self.travel = 1.0 if keeps_travel else self.scale
+        soles = [self.places[:, side.foot, 2] - source.ankle for side in self._limbs(source)]
+        soles += [self.places[:, side.toe, 2] - source.ball for side in self._limbs(source) if side.toe is not None]
+        self.floor = float(np.percentile(np.min(soles, axis=0), 2))
+        self.wanted: dict[int, np.ndarray] = {}
+
+    def motion(self) -> Motion:
+        """The motion on the target's skeleton."""
+        self._trunk()
+        sides = list(zip(self._limbs(self.source), self._limbs(self.target)))
+        for mine, theirs in sides:
+            self._limb(mine, theirs)
+        world = self._trunk_line(self._world())
+        root = self._root(world)
+        places = _laid(self.target.skeleton, world) + root[:, None]
+        for mine, theirs in sides:
+            self._reach(places, mine, theirs)
+        return Motion(self.target.skeleton, root, local_rotations(self.target.skeleton, self._world()), self.fps)
+
+    @staticmethod
+    def _limbs(anatomy: Anatomy) -> tuple[Limb, Limb]:
+        return anatomy.body.left, anatomy.body.right
+
+    def _turn(self, joint: int) -> np.ndarray:
+        """How the source's segment is turned: (T, 4)."""
+        return quaternion.multiply(self.world[:, joint], self.source.axes[joint])
+
+    def _give(self, joint: int, turn: np.ndarray) -> None:
+        """Asks the target's segment to be turned so."""
+        self.wanted[joint] = quaternion.multiply(turn, quaternion.inverse(self.target.axes[joint]))
+
+    def _trunk(self) -> None:
+        source, target = self.source.body, self.target.body
+        pelvis, chest = self._turn(source.hips), self._turn(source.chest)
+        self._give(target.hips, pelvis)
+        below = [pelvis, *(self._turn(joint) for joint in source.spine)]
+        shares = [0.0, *spine_shares(self.source.skeleton, source)]
+        for joint, share in zip(target.spine, spine_shares(self.target.skeleton, target)):
+            self._give(joint, _between(shares, below, share))
+        neck = head_chain(self.source.skeleton, source)
+        chain = head_chain(self.target.skeleton, target)
+        turns = [chest, *(self._turn(joint) for joint in neck)]
+        shares = np.linspace(0.0, 1.0, len(turns)) if neck else [0.0]
+        for number, joint in enumerate(chain):
+            self._give(joint, _between(shares, turns, (number + 1) / len(chain)))
+
+    def _limb(self, mine: Limb, theirs: Limb) -> None:
+        """Asks for one side's turns; what the source lacks goes with the part that carries it, in the end the chest."""
+        for part in _LIMB_PARTS:
+            joint = getattr(theirs, part)
+            if joint in self.target.known:
+                known = [p for p in _carriers(part) if getattr(mine, p) in self.source.known]
+                self._give(joint, self._turn(getattr(mine, known[0]) if known else self.source.body.chest))
+
+    def _world(self) -> np.ndarray:
+        """World rotations (T, J, 4) of all target joints: those asked for, and the others carried along."""
+        skeleton = self.target.skeleton
+        world = np.empty((len(self.world), len(skeleton), 4))
+        for joint, parent in enumerate(skeleton.parents):
+            if joint in self.wanted:
+                world[:, joint] = self.wanted[joint]
+                continue
+            above = world[:, parent] if parent >= 0 else quaternion.identity(len(world))
+            world[:, joint] = quaternion.multiply(above, self.target.still[joint])
+            if joint in self.pairs.others and parent >= 0:
+                extra = self._own_turn(self.pairs.others[joint])
+                world[:, joint] = quaternion.multiply(extra, world[:, joint])
+        return world
+
+    def _own_turn(self, joint: int) -> np.ndarray:
+        """The world turn (T, 4) of a source joint beyond being carried by its parent."""
+        parent = self.source.skeleton.parents[joint]
+        if parent < 0:
+            return quaternion.identity(len(self.world))
+        carried = quaternion.multiply(self.world[:, parent], self.source.still[joint])
+        return quaternion.multiply(self.world[:, joint], quaternion.inverse(carried))
+
+    def _trunk_line(self, world: np.ndarray) -> np.ndarray:
+        """Bends the trunk, below the chest where there are joints, so that the neck lies in the source's direction."""
+        spine, tops = self.target.body.spine, self.pairs.tops
+        bending = spine[:-1] or spine
+        if not bending or tops is None:
+            return world
+        line = unit_vectors(self.places[:, tops[0]] - _mid_hips(self.places, self.source), _UP)
+        for _ in range(_TRUNK_ROUNDS):
+            places = _laid(self.target.skeleton, world)
+            start, middle = places[:, bending[0]], _mid_hips(places, self.target)
+            neck = places[:, tops[1]]
+            length = np.linalg.norm(neck - middle, axis=1, keepdims=True)
+            turn = quaternion.between(neck - start, middle + line * length - start)
+            for joint in bending:
+                self.wanted[joint] = quaternion.multiply(turn, self.wanted[joint])
+            world = self._world()
+        return world
+
+    def _size(self, positions: np.ndarray) -> np.ndarray:
+        """Source positions (T, 3) at the target's size."""
+        ground = self.floor + self.source.ankle
+        heights = self.floor + self.target.ankle + self.scale * (positions[:, 2] - ground)
+        return np.column_stack([self.travel * positions[:, :2], heights])
+
+    def _root(self, world: np.ndarray) -> np.ndarray:
+        """Where the target's root is, (T, 3): its hip joints' middle stands where the source's does."""
+        middle = _mid_hips(_laid(self.target.skeleton, world), self.target)
+        return self._size(_mid_hips(self.places, self.source)) - middle
+
+    def _reach(self, places: np.ndarray, mine: Limb, theirs: Limb) -> None:
+        """Puts an ankle where the source's is, the knee pointing as it does; `places` (T, J, 3): as yet."""
+        hip, knee, ankle = (places[:, j] for j in (theirs.upper_leg, theirs.lower_leg, theirs.foot))
+        goal = self._size(self.places[:, mine.foot])
+        upper, lower = (np.linalg.norm(b - a, axis=1) for a, b in ((hip, knee), (knee, ankle)))
+        goal = _in_reach(hip, ankle, goal, upper + lower)
+        pole = self._pole(mine, hip, knee, ankle, _bend_height(np.linalg.norm(goal - hip, axis=1), upper, lower))
+        swing = quaternion.between(ankle - hip, goal - hip)
+        new_knee, new_ankle, _ = limb.bend(hip, goal, upper, lower, quaternion.rotate(swing, pole), 1e-9)
+        thigh = quaternion.between(knee - hip, new_knee - hip)
+        shank = quaternion.between(ankle - knee, new_ankle - new_knee)
+        self.wanted[theirs.upper_leg] = quaternion.multiply(thigh, self.wanted[theirs.upper_leg])
+        self.wanted[theirs.lower_leg] = quaternion.multiply(shank, self.wanted[theirs.lower_leg])
+
+
+    def _pole(self, mine: Limb, hip: np.ndarray, knee: np.ndarray, ankle: np.ndarray, height: np.ndarray) -> np.ndarray:
+        """Where a knee points (T, 3): as the source's, which says little where it is straighter than the target's will
+        be, `height` (T,) metres off the line hip-ankle; the rest of the way it bends about the thigh's own hinge."""
+        line = unit_vectors(ankle - hip, -_UP)
+        ahead = quaternion.rotate(self._turn(mine.upper_leg), np.array([1.0, 0.0, 0.0]))
+        off, ahead = (v - np.sum(v * line, axis=1, keepdims=True) * line for v in (knee - hip, ahead))
+        lacking = np.maximum(height - np.linalg.norm(off, axis=1), 0.0)
+        return off + lacking[:, None] * ahead
+
+
+def _bend_height(reach: np.ndarray, upper: np.ndarray, lower: np.ndarray) -> np.ndarray:
+    """How far the middle joint of a limb stands off the line between its ends, `reach` (T,) metres apart: (T,)."""
+    along = (upper**2 - lower**2 + reach**2) / np.maximum(2.0 * reach, 1e-9)
+    return np.sqrt(np.maximum(upper**2 - along**2, 0.0))
+
+
+def _carriers(part: str) -> list[str]:
+    """A limb's part and those above it that carry it, from below."""
+    found = [part]
+    while found[-1] in _CARRIED_BY:
+        found.append(_CARRIED_BY[found[-1]])
+    return found
+
+
+def _in_reach(hip: np.ndarray, ankle: np.ndarray, goal: np.ndarray, longest: np.ndarray) -> np.ndarray:
+    """The goal (T, 3), neared softly where it would stretch a leg straighter than the source's directions have it."""
+    asked, own = np.linalg.norm(goal - hip, axis=1), np.linalg.norm(ankle - hip, axis=1)
+    played = np.maximum(limb.soft_distance(asked, longest, _SOFT), np.minimum(asked, own))
+    return hip + (goal - hip) * (played / np.maximum(asked, 1e-9))[:, None]
+
+
+def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
+    """The middle between the hip joints: (T, 3) from positions (T, J, 3)."""
+    return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
+
+
+def _between(shares: list[float], turns: list[np.ndarray], share: float) -> np.ndarray:
+    """The turn (T, 4) at `share` among `turns` that are known at rising `shares`."""
+    high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
+    low = max(high - 1, 0)
+    width = shares[high] - shares[low]
+    if width < 1e-9 or abs(shares[high] - share) < 1e-9:
+        return turns[high]
+    return quaternion.slerp(turns[low], turns[high], np.clip((share - shares[low]) / width, 0.0, 1.0))
+
+
+def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
+    """Positions (T, J, 3) for world rotations (T, J, 4), the root at the origin."""
+    parents = list(skeleton.parents[1:])
+    bones = quaternion.rotate(world[:, parents], skeleton.offsets[1:])
+    places = np.zeros((len(world), len(skeleton), 3))
+    for joint, parent in enumerate(parents, 1):
+        places[:, joint] = places[:, parent] + bones[:, joint - 1]
+    return places

@@ -1,0 +1,184 @@
+"""Legs, arms, neck and head of a tree of joints without telling names: two limbs alike that hang on one joint.
+
+Limbs come in pairs whose bones are of one length. The two longest pairs are legs and arms; the legs hang nearer to the
+root. Left and right are told by the poses: toes point forward and knees bend backward, from there left is up x forward.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+
+from ...base.vectors import unit_vectors
+
+_ALIKE = 0.15  # relative difference of two bones that count as left and right
+_SHORTEST = 0.3  # of the longest pair: upper plus lower bones of a pair
+_NEARLY = 0.6
+_TELLING = 1e-2
+
+
+def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[str, int] | None:
+    """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found.
+
+    tips (T, J, 3): where each joint's bone ends, the joint itself where that is not known; shows how toeless feet
+    point.
+    """
+    lengths = np.array([np.linalg.norm(places[0, j] - places[0, p]) if p >= 0 else 0.0 for j, p in enumerate(parents)])
+    pairs = _limb_pairs(list(parents), lengths)
+    if not pairs:
+        return None
+    legs, arms = _legs_and_arms(parents, pairs)
+    left, right = _sided(legs, places, tips, parents, arms)
+    roles = {"hips": common_ancestor(parents, [left[0], right[0]])}
+    across = places[:, left[0]] - places[:, right[0]]
+    for side, leg in (("left", left), ("right", right)):
+        toe = _toe(parents, lengths, leg[2])
+        roles |= {f"{side} {part}": j for part, j in zip(("upper_leg", "lower_leg", "foot"), leg)}
+        roles |= {f"{side} toe": toe} if toe is not None else {}
+    if arms is not None:
+        apart = places[:, arms[0][0]] - places[:, arms[1][0]]
+        ordered = arms if np.sum(apart * across) >= 0.0 else arms[::-1]
+        chest = common_ancestor(parents, [arms[0][0], arms[1][0]])
+        for side, arm in zip(("left", "right"), ordered):
+            roles |= {f"{side} {part}": j for part, j in zip(("upper_arm", "lower_arm", "hand"), arm)}
+            if parents[arm[0]] != chest:
+                roles[f"{side} shoulder"] = parents[arm[0]]
+    return roles
+
+
+def _limb_pairs(parents, lengths) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Pairs of limbs (upper, middle, end joint) that hang on one joint and are alike, longest first."""
+    onward, found = _onward(parents, lengths), []
+    for joint in {p for p in parents if parents.count(p) > 1 and p >= 0}:
+        limbs = [limb for child in children(parents, joint) if (limb := _limb(lengths, onward, child))]
+        for a, b in combinations(limbs, 2):
+            sizes = np.array([[lengths[limb[1]], lengths[limb[2]]] for limb in (a, b)])
+            if np.all(np.abs(sizes[0] - sizes[1]) <= _ALIKE * sizes.max(axis=0)):
+                found.append((float(sizes.sum()), joint, (a, b)))
+    found.sort(key=lambda one: (-one[0], one[1]))
+    longest = found[0][0] if found else 0.0
+    return [pair for size, _, pair in found if size > _SHORTEST * longest and size > 1e-6]
+
+
+def _onward(parents, lengths) -> list[int]:
+    """For each joint the one below it on the way to its farthest end, -1 at an end."""
+    reach, onward = np.zeros(len(parents)), [-1] * len(parents)
+    for joint in range(len(parents) - 1, 0, -1):
+        if onward[parents[joint]] < 0 or reach[joint] + lengths[joint] >= reach[parents[joint]]:
+            reach[parents[joint]] = reach[joint] + lengths[joint]
+            onward[parents[joint]] = joint
+    return onward
+
+
+def _limb(lengths, onward, start: int) -> tuple[int, int, int] | None:
+    """The three joints around the two longest bones in a row on the way from `start` to its farthest end."""
+    chain = [start]
+    while onward[chain[-1]] >= 0:
+        chain.append(onward[chain[-1]])
+    if len(chain) < 3:
+        return None
+    shorter = [min(lengths[chain[i + 1]], lengths[chain[i + 2]]) for i in range(len(chain) - 2)]
+    # the last such pair: a long collar bone comes before the arm, hands and toes are much shorter than their limb
+    best = max(i for i, length in enumerate(shorter) if length >= _NEARLY * max(shorter))
+    return tuple(chain[best : best + 3])
+
+
+def _legs_and_arms(parents, pairs):
+    """Of the longest two pairs that share no joint, the one that hangs nearer to the root, and the other or None."""
+    first = pairs[0]
+    taken = {j for limb in first for j in limb}
+    second = next((pair for pair in pairs[1:] if not taken & {j for limb in pair for j in limb}), None)
+    if second is None:
+        return first, None
+    depth = [len(path(parents, common_ancestor(parents, [pair[0][0], pair[1][0]]))) for pair in (first, second)]
+    return (first, second) if depth[0] <= depth[1] else (second, first)
+
+
+def _sided(legs, places, tips, parents, arms):
+    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as they
+    stand."""
+    a, b = legs
+    hips = 0.5 * (places[:, a[0]] + places[:, b[0]])
+    ends = [arm[0] for arm in arms] if arms is not None else [0]
+    up = unit_vectors(places[:, ends].mean(axis=1) - hips) if arms is not None else np.array([0.0, 0.0, 1.0])
+    across = unit_vectors(places[:, a[0]] - places[:, b[0]])
+    vote = 0.0
+    for leg in (a, b):
+        thigh, shank = (unit_vectors(places[:, leg[i + 1]] - places[:, leg[i]]) for i in (0, 1))
+        vote += np.mean(np.sum(np.cross(thigh, shank) * across, axis=1))
+        toes = children(parents, leg[2])
+        ends = places[:, toes].mean(axis=1) if toes else tips[:, leg[2]]
+        vote += np.mean(np.sum(np.cross(up, unit_vectors(ends - places[:, leg[2]])) * across, axis=1))
+    return (a, b) if vote > -_TELLING else (b, a)
+
+
+def _toe(parents, lengths, foot: int) -> int | None:
+    """The longest bone's joint that hangs on the foot."""
+    return max(children(parents, foot), key=lambda j: lengths[j], default=None)
+
+
+def neck_and_head(parents, chest: int, taken: set[int], roles: Mapping[str, int]) -> dict[str, int]:
+    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has is
+    kept."""
+    if "neck" in roles:
+        chain = _straight(parents, roles["neck"])
+    else:
+        limbs = {joint for limb in taken if limb != chest for joint in path(parents, limb)}
+        free = [_straight(parents, child) for child in children(parents, chest) if child not in limbs]
+        chain = max(free, key=len, default=[]) if "head" not in roles else []
+    found = {"neck": chain[0]} if chain else {}
+    return {**found, "head": chain[-1]} if len(chain) > 1 else found
+
+
+def _straight(parents, start: int) -> list[int]:
+    """`start` and the joints below it as long as there is just one."""
+    chain = [start]
+    while len(children(parents, chain[-1])) == 1:
+        chain += children(parents, chain[-1])
+    return chain
+
+
+def mirrored(parents, pairs: Iterable[tuple[int, int]]) -> tuple[int, ...]:
+    """For each joint the one on the other side: of `pairs`, of what they hang on before they meet, and, child by child,
+    of what hangs on them."""
+    out = list(range(len(parents)))
+    pairs = [(a, b) for pair in pairs for a, b in zip(path(parents, pair[0]), path(parents, pair[1])) if a != b]
+    known = {joint for pair in pairs for joint in pair}
+    while pairs:
+        a, b = pairs.pop()
+        out[a], out[b] = b, a
+        rest = [[child for child in children(parents, joint) if child not in known] for joint in (a, b)]
+        if len(rest[0]) == len(rest[1]):
+            pairs += zip(*rest)
+    return tuple(out)
+
+
+def children(parents, joint: int) -> list[int]:
+    """The joints that hang on `joint`."""
+    return [i for i, p in enumerate(parents) if p == joint]
+
+
+def path(parents, joint: int) -> list[int]:
+    """From `joint` up to the root, both included."""
+    found = []
+    while joint >= 0:
+        found.append(joint)
+        joint = parents[joint]
+    return found
+
+
+def below(parents, joint: int) -> list[int]:
+    """`joint` and everything that hangs on it."""
+    found = {joint}
+    for other, parent in enumerate(parents):
+        if parent in found:
+            found.add(other)
+    return sorted(found)
+
+
+def common_ancestor(parents, joints: Sequence[int]) -> int:
+    """The lowest joint from which all of `joints` hang (itself not counted as hanging on itself unless it is one)."""
+    shared = set(path(parents, joints[0])).intersection(*(path(parents, j) for j in joints[1:]))
+    return max(shared, key=lambda j: len(path(parents, j)))

@@ -1,0 +1,1 @@
+"""Players who keep a ball going: hits, pass planning, bodies, live scenes (Ball handling)."""

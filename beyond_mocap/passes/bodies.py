@@ -1,0 +1,300 @@
+"""The recipe of one player of a passing scene: his hit motions where and when they were ordered, and what he does
+between.
+
+The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
+`passes.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
+(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball is never moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..annotation import Timeline, automatic_gaits
+from ..annotation.gaze import wanted_offset
+from ..annotation.timeline import KeyMoment
+from .alike import alike
+from ..ball.contact import striking_surface
+from .links import BoneWeights
+from .orders import HitOrder, Stance
+from .way import Placed, needed, placed, way
+from ..base.easing import smoothstep
+from ..base.time_series import interpolate
+from ..base.errors import InputError, told_time
+from ..library.automatic import automatic_words
+from ..library.keys import Key
+from ..library.library import Library
+from ..motion import quaternion
+from ..base.arctangent import arctan2
+from ..motion.motion import Motion
+from ..annotation.striking import BODY_PARTS
+from ..motion.track import BALL_RADIUS, SampledTrack, Track
+from ..motion.track.sampling import travel_direction
+from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.construct.gaze import CHEST, following
+from ..synthesis.construct.on_track import STANDS, follow_turning
+from ..synthesis.construct.ball.strike import Touch
+from ..synthesis.construct.ball.strike_at import Meeting, Met, met_at
+from ..synthesis.construct.construction import Construction
+from ..synthesis.search.footage import Footage, fetch
+from ..synthesis.frame_sources import provenance_fields
+from ..synthesis.search.path_costs import Alike
+from ..synthesis.search.path_search import PathSearch
+from ..synthesis.search.wanted import Wanted, WantedKey
+from ..synthesis.synthesize import look_of
+from ..motion.track.ball_path import BallPath
+from ..synthesis.take import Take
+
+TRANSITION = 0.4
+"""Seconds over which one piece of clip gives way to the next."""
+
+FASTER = 1.15
+"""Times the library's highest speed that a player may go without being told."""
+
+OWN_HEAD = 0.3
+"""Seconds around a header in which the head moves as recorded; it goes over within as many more."""
+
+_PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # "hand" itself is no label
+_WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
+
+
+@dataclass(frozen=True)
+class BodySettings:
+    """transition: seconds of a fade between pieces of clips (§4: S_T). watch: whether the head follows the ball. seed:
+    of the take's record; nothing here is left to chance. weights: of bones in eq. 1, by which one pose is like another
+    where a clip is left for the next."""
+
+    transition: float = TRANSITION
+    watch: bool = True
+    seed: int = 0
+    weights: BoneWeights = BoneWeights()
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PlayerMotion:
+    """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
+    (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for
+    it. warnings: what could not be as ordered."""
+
+    take: Take
+    gaps: np.ndarray
+    moved: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def player_motion(
+    library: Library,
+    stance: Stance,
+    orders: Sequence[HitOrder],
+    ball: BallPath,
+    ball_radius: float = BALL_RADIUS,
+    frames: int | None = None,
+    fps: float = 30.0,
+    settings: BodySettings = BodySettings(),
+    progress: Callable[[float, str], None] | None = None,
+    cancelled: Callable[[], bool] | None = None,
+) -> PlayerMotion:
+    """The motion of a player who begins at `stance` and strikes as `orders` say.
+
+    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the
+    ball's). The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
+    """
+    from threadpoolctl import threadpool_limits
+
+    count = len(ball.times) if frames is None else frames
+    orders = sorted(orders, key=lambda order: order.time)
+    _check(orders, ball.times, fps)
+    with threadpool_limits(limits=1):
+        return _Body(library, stance, orders, ball, ball_radius, count, fps, settings).made(progress, cancelled)
+
+
+def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) -> float:
+    """Seconds from one strike (or from standing) to the next that the body needs in haste: to come out of the one
+    motion, to go over and turn, and to begin the other."""
+    then = Placed.of(library, after)
+    into = after.time - then.start
+    end = (0.0, then.path(np.array([then.start]))[0], then.velocity(then.start))
+    if isinstance(before, Stance):
+        state, out = (0.0, np.array(before.place, float), np.zeros(2)), 0.0
+    else:
+        hit = Placed.of(library, before)
+        out = hit.end - before.time
+        state = (0.0, hit.path(np.array([hit.end]))[0], hit.velocity(hit.end))
+    still = np.linalg.norm(end[1] - state[1]) < 0.15 and max(np.linalg.norm(end[2]), np.linalg.norm(state[2])) < 0.3
+    turn = abs(float(quaternion.wrapped(after.facing - before.facing)))
+    return out + into + max(turn / 2.0, 0.2 if still else needed(state, end))
+
+
+def strike_words(library: Library) -> frozenset[str]:
+    """The words by which the library's key moments are told from what goes on between them."""
+    rows = [row for clip in library.clips for row in clip.annotations]
+    between = {word for row in rows if row.key is None for word in row.words}
+    return frozenset(word for row in rows if row.key is not None for word in row.words) - between
+
+
+def _check(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> None:
+    for order in orders:
+        if not times[0] - 0.5 / fps <= order.time <= times[-1] + 0.5 / fps:
+            scene = f"{told_time(times[0])} to {told_time(times[-1])} s"
+            raise InputError("strike", f"at {told_time(order.time)} s", f"within the scene, {scene}")
+    for before, after in zip(orders, orders[1:]):
+        if after.time - before.time < 2.0 / fps:
+            raise InputError("strike", f"two of one player at {after.time:g} s", "one at a time")
+
+
+class _Body:
+    """One player on his way to his motion."""
+
+    def __init__(self, library, stance, orders, ball, ball_radius, count, fps, settings):
+        self.library, self.orders, self.fps, self.settings = library, orders, fps, settings
+        self.ball_radius, self.stance = ball_radius, stance
+        self.start = float(ball.times[0])
+        self.hits = placed(library, orders, self.start)
+        self.times = self.start + np.arange(count) / fps
+        self.ball = interpolate(self.times, ball.times, ball.positions)
+
+    def made(self, progress, cancelled) -> PlayerMotion:
+        report = progress or (lambda fraction, text: None)
+        count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
+        order = self._wanted(self.start + np.arange(count) / self.library.fps)
+        half = int(round(0.5 * self.settings.transition * self.library.fps))
+        measure = Alike(alike(self.library, self.settings.weights), tuple(sorted({-half, half})))
+        edit = PathSearch(
+            self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled,
+            alike=measure,
+        ).run()
+        index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
+        source = fetch(self.library, edit, index, self.fps)
+        track, path = self._track(self.times, self.fps)
+        asked = self._plan(track)
+        plan = resolve_plan(asked, self.library)
+        report(0.75, "Laying out")
+        planted, taken = Construction(
+            library=self.library, plan=plan, track=track, source=source, touches=self._touches(),
+            heading=self._heading(track, path.facing, source), planned=True,
+        ).lay_out()
+        body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
+        body = self._watching(body)
+        struck = met_at(body, taken.standing.any(axis=2), self._meetings())
+        ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
+        take = Take(
+            **provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
+            contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path", seed=self.settings.seed,
+            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=asked, edit=edit,
+        )
+        report(1.0, "Done")
+        return PlayerMotion(take=take, gaps=struck.gap, moved=struck.moved, warnings=self._warnings(struck, track))
+
+    def _wanted(self, times: np.ndarray) -> Wanted:
+        """What the search is asked for, at the library's rate."""
+        library = self.library
+        track, _ = self._track(times, library.fps)
+        speeds = np.array([gait.speed for gait in library.gaits])
+        gait = automatic_gaits(track.speed, library.fps, speeds, library.gait_thresholds)
+        words = [frozenset(words) for words in automatic_words(library, gait, track)]
+        strikes = strike_words(library)
+        keys = tuple(self._key(hit, (hit.order.time - self.start) * library.fps) for hit in self.hits)
+        for hit in self.hits:
+            for frame in np.flatnonzero((times >= hit.start) & (times <= hit.end)):
+                words[frame] = None
+        allowed = np.ones(len(library.clips), bool)
+        avoided = tuple(strikes for _ in words) if strikes else ()
+        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, (), avoided)
+
+    def _key(self, hit: Placed, frame: float) -> WantedKey:
+        order = hit.order
+        clip = self.library.clips[order.clip]
+        frames = range(int(hit.first), int(hit.last) + 1)
+        words = frozenset({_PART_LABELS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
+        key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, words)
+        return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
+
+    def _track(self, times: np.ndarray, fps: float):
+        """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
+        path = way(self.stance, self.hits, times)
+        velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
+        ball = interpolate(times, self.times, self.ball)
+        track = SampledTrack(
+            times=times, positions=path.positions, raw=path.positions, velocity=velocity,
+            speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
+            valid=np.ones(len(times), bool), ball=ball, ball_measured=np.ones(len(times), bool), fps=float(fps),
+        )
+        return track, path
+
+    def _plan(self, track: SampledTrack) -> Plan:
+        """What stands in a take's plan: the little track."""
+        return Plan(
+            track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
+            seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
+        )
+
+    def _heading(self, track: SampledTrack, kept: np.ndarray, source: Footage) -> np.ndarray:
+        """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
+        short way round."""
+        known = np.flatnonzero(np.isfinite(kept))
+        rough = np.interp(np.arange(len(kept)), known, kept[known])
+        own_speed = np.linalg.norm(source.velocity, axis=1)
+        moving = [np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0) for speed in (track.speed, own_speed)]
+        going = moving[0] ** 2 * moving[1] ** 2
+        travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
+        watch = track.direction + wanted_offset(track)
+        weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
+        goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
+        trust = weights.sum(axis=0) + 1e-6
+        goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
+        given = np.isfinite(kept)
+        goal, trust = np.where(given, kept, goal), np.where(given, 1e6, trust)
+        return follow_turning(goal, trust, source.turn)
+
+    def _touches(self) -> list[Touch]:
+        """The hit motions as stretches in which no steps are added."""
+        return [
+            Touch(
+                (hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
+                (hit.end - hit.order.time) * self.fps,
+            ) for hit in self.hits
+        ]  # fmt: skip
+
+    def _watching(self, body: Motion) -> Motion:
+        """The body with its head on the ball, but for the moments in which the head itself strikes; the chest, which
+        carries the arms, stays out of it in his hit motions."""
+        if not self.settings.watch:
+            return body
+        share = np.ones(len(self.times))
+        for order in self.orders:
+            if order.part == "head":
+                share *= np.clip((np.abs(self.times - order.time) - OWN_HEAD) / OWN_HEAD, 0.0, 1.0)
+        arms = np.ones(len(self.times))
+        for hit in self.hits:
+            outside = np.maximum(hit.start - self.times, self.times - hit.end)
+            arms *= np.clip(outside / OWN_HEAD, 0.0, 1.0)
+        share, arms = smoothstep(share), smoothstep(arms)
+        return following(body, self.ball, look_of(self.library), share, CHEST * arms)
+
+    def _meetings(self) -> list[Meeting]:
+        skeleton, out = self.library.skeleton, []
+        for hit in self.hits:
+            order = hit.order
+            surface = striking_surface(skeleton, order.part, order.side, order.tool)
+            frame = (order.time - self.start) * self.fps
+            entry, leave = (frame - (hit.start - self.start) * self.fps, (hit.end - self.start) * self.fps - frame)
+            ball = np.array(order.ball) if order.touches else np.full(3, np.nan)
+            out.append(Meeting(frame, surface, ball, self.ball_radius, entry, leave))
+        return out
+
+    def _warnings(self, struck: Met, track: SampledTrack) -> tuple[str, ...]:
+        told, fastest = [], int(np.argmax(track.speed))
+        if track.speed[fastest] > FASTER * self.library.fastest:
+            asks, has = track.speed[fastest], self.library.fastest
+            told.append(
+                f"{self.times[fastest]:.2f} s: he would have to run {asks:.1f} m/s to be there in time; "
+                f"the library has {has:.1f} m/s: give him more time, or a place nearer by"
+            )
+        for order, gap in zip(self.orders, struck.gap):
+            if gap > 0.005:
+                told.append(f"{order.time:.2f} s: the {order.part} is {100.0 * gap:.1f} cm off the ball")
+        return tuple(told)

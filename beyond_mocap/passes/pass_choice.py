@@ -1,0 +1,245 @@
+"""Which frame of which hit motion makes each strike, facing where, and how long its ball travels (Table 1, steps
+2 to 7).
+
+All natural ways of a ball stretch are looked at, and those that come nearest to the next player are kept. From the last
+strike to the first, since each flight goes to where the next strike is, the exact flights of all these and of many
+times of travel are worked out, and the one is taken that changes the natural velocity least.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.vectors import unit_vectors
+from ..base.errors import InputError
+from ..motion import quaternion
+from ..base.arctangent import arctan2
+from ..ball.aim import aim
+from ..ball.batch import courses
+from ..ball.contact import in_world
+from .pass_costs import (
+    TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, cost_of_moments, lasting, misses, rising, spun, through_body,
+    ways_of, wished,
+)  # fmt: skip
+from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
+from .pass_scene import GROUND, RECEIVE, Pass
+from .strike_moments import StrikeMoments, launched_from
+
+TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
+"""Radians by which a body may face beside where its motion sends the ball by itself."""
+
+EIGHTH = 0.25 * np.pi  # rad: an eighth of a whole turn
+MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
+CHANCE, AGAIN = 0.4, 0.6
+"""m/s by which chance tells hit motions apart that are as good, and what each use before by the same player costs."""
+
+SHORTEST, LONGEST, PER_BOUNCE, TRIED = 0.4, 2.6, 0.5, 16
+"""Seconds of travel that are tried, from the shortest to the longest, which is longer for each bounce, and how many."""
+
+LIES = 0.2
+"""Metres above where a ball lies on the ground up to which a foot's strike may be at a ball that lies there."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Options:
+    """What is left of a strike's moments after the natural ways: moments (M), facing (M,) rad, cost (M,) m/s,
+    natural."""
+
+    moments: StrikeMoments
+    facing: np.ndarray
+    cost: np.ndarray
+    natural: Natural
+
+    def centres(self, site: Site, normal: np.ndarray, radius: float) -> np.ndarray:
+        """(M, 3) m: the ball on the part toward `normal` (M, 3), world."""
+        own = quaternion.rotate(quaternion.about_up(-self.facing), normal)
+        return in_world(self.moments.ball(own, radius), site.place, self.facing)
+
+    def velocities(self) -> np.ndarray:
+        """(M, 3) m/s of the parts, world."""
+        return quaternion.rotate(quaternion.about_up(self.facing), self.moments.struck.velocity)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Flights (N) of a strike: from which option, starts (N, 3), target (3,), seconds, velocity (N, 3); cost (N,),
+    infinite where it cannot be; reached: whether any comes to the target at all, net or no net."""
+
+    option: np.ndarray
+    starts: np.ndarray
+    target: np.ndarray
+    seconds: np.ndarray
+    velocity: np.ndarray
+    cost: np.ndarray
+    reached: bool
+
+    def and_also(self, more: _Tried) -> _Tried:
+        """Both together."""
+        names = ("option", "starts", "seconds", "velocity", "cost")
+        joined = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in names}
+        return _Tried(target=self.target, reached=self.reached or more.reached, **joined)
+
+
+def choose(court: Court, progress: Callable[[float, str], None]) -> list[Link]:
+    """Every strike of a scene. InputError where no human sends the ball so far, or over the net; Cancelled."""
+    random = np.random.default_rng(court.scene.seed & (2**64 - 1))
+    used: dict[tuple, int] = {}
+    options = []
+    for number, site in enumerate(court.sites):
+        court.check()
+        progress(0.5 * number / len(court.sites), f"{site.player}'s strike")
+        options.append(_options(court, number, site, used, random))
+    chain: list[Link | None] = [None] * len(court.sites)
+    chain[-1] = _simplest(options[-1])
+    for number in range(court.last - 1, -1, -1):
+        court.check()
+        progress(1.0 - 0.5 * (number + 1) / len(court.sites), f"{court.sites[number].player}'s flight")
+        chain[number] = _linked(court, number, options[number], chain[number + 1])
+    return chain
+
+
+def seconds_of(one: Pass, fps: float) -> np.ndarray:
+    """(S,) s, on whole frames: the times of travel that are tried."""
+    if one.seconds is not None:
+        return np.array([max(round(one.seconds * fps), 1) / fps])
+    longest = LONGEST + PER_BOUNCE * one.bounces
+    return np.unique(np.round(np.geomspace(SHORTEST, longest, TRIED) * fps)) / fps
+
+
+def _options(court: Court, number: int, site: Site, used: dict, random: np.random.Generator) -> _Options:
+    """The moments whose natural ways come nearest to where the ball is to go (steps 2, 3, 5, 6)."""
+    toward = court.toward(number)
+    moments, facing = _faced(court, _possible(court, number, site), site, toward)
+    starts, velocities = launched_from(moments, site.place, facing, court.ball.radius)
+    cost = cost_of_moments(moments, facing, court.whence(number) - site.place)
+    if site.asked is None:
+        cost += 0.3 * np.linalg.norm(velocities, axis=1)
+    else:
+        cost += misses(*courses(starts, velocities, None, court.ball, TIMES), toward, site.asked.bounces)
+    keys = [(site.player, moments.hits[which].clip, moments.hits[which].hit.first) for which in moments.which]
+    chance = dict(zip(sorted(set(keys)), random.uniform(0.0, CHANCE, len(set(keys)))))
+    cost += np.array([chance[key] + AGAIN * used.get(key, 0) for key in keys])
+    kept = _best(cost, moments.which)
+    used[keys[kept[0]]] = used.get(keys[kept[0]], 0) + 1
+    return _Options(moments.only(kept), facing[kept], cost[kept], Natural(starts, velocities, int(kept[0])))
+
+
+def _faced(court: Court, moments: StrikeMoments, site: Site, toward: np.ndarray) -> tuple[StrikeMoments, np.ndarray]:
+    """Each moment with each way to face, and these (N,) rad: where the natural way goes at `toward` (3,) m, and
+    beside."""
+    velocity = moments.struck.velocity
+    natural = arctan2(velocity[:, 1], velocity[:, 0]) * (site.asked is not None)  # a trap gives way
+    bearing = np.arctan2(*(toward[:2] - site.place)[::-1])
+    facing = (bearing - natural)[:, None] + TURNS
+    if court.scene.directions:
+        facing = site.facing + np.round(quaternion.wrapped(facing - site.facing) / EIGHTH) * EIGHTH
+    every = np.repeat(np.arange(len(moments)), facing.shape[1])
+    return moments.only(every), quaternion.wrapped(facing.ravel())
+
+
+def _possible(court: Court, number: int, site: Site) -> StrikeMoments:
+    """All of a site's moments; for a ball that lies on the ground those that are low enough."""
+    moments, radius = site.moments, court.ball.radius
+    if number or court.scene.serve != GROUND:
+        return moments
+    height = moments.ball(np.broadcast_to([1.0, 0.0, 0.0], (len(moments), 3)), radius)[:, 2]
+    if height.min() >= radius + LIES:
+        lowest = f"no {site.part} of {site.player}'s motions is below {height.min():.2f} m"
+        found = f"the ball lies on the ground, and {lowest}"
+        raise InputError("serve", found, "a motion that strikes lower", "let the ball come from a player or a place")
+    return moments.only(height < radius + LIES)
+
+
+def _simplest(options: _Options) -> Link:
+    best = int(np.argmin(options.cost))
+    return Link(options.moments.only([best]), float(options.facing[best]), 0.0, np.zeros(3), options.natural)
+
+
+def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
+    """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all
+    times with the best option, then the best times with all."""
+    seconds = seconds_of(court.passes[number], court.scene.fps)
+    tried = _tried(court, number, options, after, np.zeros(len(seconds), int), seconds)
+    best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
+    others = np.arange(1, len(options.cost))
+    tried = tried.and_also(_tried(court, number, options, after, *_each(others, seconds[best])))
+    if not np.isfinite(tried.cost).any():
+        raise _refusal(court, number, tried)
+    best = int(np.argmin(tried.cost))
+    option = int(tried.option[best])
+    chosen = int(np.argmin(np.linalg.norm(options.natural.starts - tried.starts[best], axis=1)))
+    return Link(
+        options.moments.only([option]), float(options.facing[option]), float(tried.seconds[best]), tried.velocity[best],
+        replace(options.natural, chosen=chosen),
+    )  # fmt: skip
+
+
+@np.errstate(over="ignore", invalid="ignore")  # what is not possible may be faster than numbers go
+def _tried(
+    court: Court, number: int, options: _Options, after: Link, option: np.ndarray, seconds: np.ndarray
+) -> _Tried:
+    """Flights from `option` (N,) that take `seconds` (N,), and what each costs."""
+    site, one, receiver = court.sites[number], court.passes[number], court.sites[number + 1]
+    natural = wished(options.velocities(), site.kind)
+    starts = options.centres(site, unit_vectors(natural), court.ball.radius)[option]
+    target = court.ball_on(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
+    spin = spun(starts, target, seconds, court.ball, site.kind)
+    aimed = aim(starts, target, court.ball, seconds, one.bounces, spin, fastest=court.fastest(number))
+    flights = (starts, aimed.velocity, spin, seconds)
+    ways, arriving = ways_of(*flights, court.ball), arrivals(*flights, court.ball)
+    cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
+    cost += court.in_the_way(number, ways).max(axis=1, initial=0.0)
+    for near in (site, receiver):
+        cost += through_body(ways, court.ball.radius, near.place, near.size * TRUNK_TO.get(near.part, UPRIGHT))
+    cost += against_the_part(arriving, after.velocity, _pushes(receiver, after))
+    cost += rising(arriving) + lasting(seconds, site.kind)
+    good = aimed.possible & (aimed.miss <= ON_TARGET)
+    cost = np.where(good & court.clear(ways), cost, np.inf)
+    return _Tried(option, starts, target, seconds, aimed.velocity, cost, bool(good.any()))
+
+
+def _pushes(site: Site, link: Link) -> np.ndarray:
+    """(3,): the way in which the part pushes the ball: as it moves; who receives gives way, and has it before him."""
+    own = [0.8, 0.0, 0.6] if site.kind == RECEIVE else link.moment.struck.velocity[0]
+    return turned(np.array([own]), link.facing)[0]
+
+
+def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
+    """Why no flight of a pass can be."""
+    one, part, net = court.passes[number], court.sites[number].part, court.scene.net
+    bounces = "a bounce" if one.bounces == 1 else f"{one.bounces} bounces"
+    if tried.reached:
+        found = f"no way over a net of {net.height:g} m with {bounces}"
+        next_step = "lower the net, change bounces or seconds, or move them away from it"
+        return InputError(court.name(number), found, "one that goes over it", next_step)
+    within = f" in {one.seconds:g} s" if one.seconds else ""
+    far = np.linalg.norm(tried.target - tried.starts[0])
+    seconds = seconds_of(one, court.scene.fps) if one.seconds else None
+    free = aim(tried.starts[:1], tried.target, court.ball, seconds, one.bounces)
+    speed, fastest = float(np.linalg.norm(free.velocity[0])), court.fastest(number)
+    found, expected = f"no way of {far:.1f} m{within} with {bounces}", f"one that a human can give by {part}"
+    if free.miss[0] <= ON_TARGET and speed > fastest:
+        found = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s"
+        expected = f"up to {fastest:.0f} m/s by {part}"
+    return InputError(court.name(number), found, expected, "move them nearer, or change bounces or seconds")
+
+
+def _best(cost: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Indices of the least costs, MOST_OPTIONS at most, and MOST_OF_A_HIT of one hit motion."""
+    kept: list[int] = []
+    of_hit: dict[int, int] = {}
+    for index in np.argsort(cost, kind="stable"):
+        if of_hit.get(int(which[index]), 0) < MOST_OF_A_HIT:
+            kept.append(int(index))
+            of_hit[int(which[index])] = of_hit.get(int(which[index]), 0) + 1
+        if len(kept) == MOST_OPTIONS:
+            break
+    return np.array(kept, dtype=int)
+
+
+def _each(options: np.ndarray, seconds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Every option (N,) with every time (S,): two arrays (N S,)."""
+    return np.repeat(options, len(seconds)), np.tile(seconds, len(options))

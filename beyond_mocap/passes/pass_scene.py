@@ -1,0 +1,363 @@
+"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form as a
+file)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+
+from ..base.settings import defaults, setting
+from ..base.errors import InputError
+from ..ball.contact import Tool
+from .hits import HitMotion
+
+KINDS = ("toss", "pass", "attack")
+RECEIVE = "receive"
+SIDES = ("", "left", "right")
+ERRORS = ("", "missed", "dropped")
+GROUND = "ground"
+LEAST_APART = 0.5
+"""Metres between two players' places."""
+_DEFAULTS = defaults("passes")
+_ROWS = (
+    *(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
+    *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"),
+)  # fmt: skip
+LIMITS = {
+    **{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
+    "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1),
+}  # fmt: skip
+"""Least and most of a scene's numbers."""
+MOST_PASSES, MOST_PLAYERS = 1000, 100
+BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
+"""Bones whose weights in eq. 1 can be set (`links.BONES`)."""
+
+RESERVED = ("ball", "strikes", "scene")
+"""Names that other files of a scene have."""
+
+LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
+"""Metres that a tool in the hand has at most."""
+
+FAR = 100.0
+"""Metres between two players, above which nobody passes."""
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Player:
+    """Who takes part. place: (x, y) m where he stands. facing: rad from +x before the ball concerns him, None: toward
+    the middle of the others. part, side: what he strikes with, side one of SIDES. tool: in his hand. height: m, 0: as
+    the library's skeleton."""
+
+    name: str
+    place: Place
+    facing: float | None = None
+    part: str = "foot"
+    side: str = ""
+    tool: Tool | None = None
+    height: float = 0.0
+
+
+@dataclass(frozen=True)
+class Example:
+    """A stretch of a recording that a strike is to be like (eq. 2). clip: path below the library; start, end: s, end
+    None: as long as it is. hit: the hit motion itself, where it comes from elsewhere, such as a live stream."""
+
+    clip: str
+    start: float = 0.0
+    end: float | None = None
+    hit: HitMotion | None = None
+
+
+@dataclass(frozen=True)
+class Pass:
+    """One pass. giver, receiver: names. kind: of KINDS. bounces: of the ball on its way. part, side: of the giver's
+    body, None: as he has it. seconds: that the ball travels, None: by the motion. at: (x, y) m where the receiver meets
+    it, None: where he stands. example: None: any strike of the kind. error: of ERRORS, what the receiver does wrong."""
+
+    giver: str
+    receiver: str
+    kind: str = "pass"
+    bounces: int = 1
+    part: str | None = None
+    side: str | None = None
+    seconds: float | None = None
+    at: Place | None = None
+    example: Example | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True)
+class Net:
+    """A net that stands on the ground between two places (x, y) m, `height` m high."""
+
+    start: Place
+    end: Place
+    height: float
+
+
+@dataclass(frozen=True)
+class Weights:
+    """What eq. 2 (speed, vectors, times: an example's likeness) and eq. 1 (position, velocity: a transition's) are
+    times, and bones: one of BONES -> what it is times in eq. 1."""
+
+    speed: float = 1.0
+    vectors: float = 1.0
+    times: float = 1.0
+    position: float = 1.0
+    velocity: float = 1.0
+    bones: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self):
+        object.__setattr__(self, "bones", MappingProxyType(dict(self.bones)))
+
+
+@dataclass(frozen=True)
+class BallChoice:
+    """A ball: one of the known kinds, with other numbers where `changes` says so (`physics.Ball`'s own names)."""
+
+    kind: str = "paper"
+    changes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __post_init__(self):
+        object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))
+
+
+@dataclass(frozen=True)
+class PassScene:
+    """What is asked. players; passes in their order. fps: of the output. serve: where the ball comes from first: a
+    player's name, (x, y, z) m, GROUND, or None: the player who would pass to the first one. directions: 8: strikes turn
+    in steps of 45 degrees; 0: any way. The settings table says what the other fields mean.
+
+    InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
+    passes that do not go on where the one before went, numbers outside LIMITS.
+    """
+
+    players: tuple[Player, ...]
+    passes: tuple[Pass, ...]
+    repeat: int = _DEFAULTS["repeat"]
+    fps: float = 30.0
+    seed: int = _DEFAULTS["seed"]
+    ball: BallChoice = BallChoice()
+    net: Net | None = None
+    serve: str | tuple[float, float, float] | None = None
+    missed: float = _DEFAULTS["missed"]
+    dropped: float = _DEFAULTS["dropped"]
+    transition: float = _DEFAULTS["transition"]
+    lead_in: float = _DEFAULTS["lead_in"]
+    lead_out: float = _DEFAULTS["lead_out"]
+    directions: int = 0
+    watch: bool = _DEFAULTS["watch"]
+    weights: Weights = Weights()
+
+    def __post_init__(self):
+        object.__setattr__(self, "players", tuple(self.players))
+        object.__setattr__(self, "passes", tuple(self.passes))
+        _check_players(self.players)
+        _check_passes(self)
+        _check_numbers(self)
+
+    def player(self, name: str) -> Player:
+        """The player of a name."""
+        return next(one for one in self.players if one.name == name)
+
+    @property
+    def order(self) -> tuple[Pass, ...]:
+        """All passes in their order, repeats too, up to the first that is meant to go wrong."""
+        out = []
+        for one in self.passes * self.repeat:
+            out.append(one)
+            if one.error:
+                break
+        return tuple(out)
+
+    def facing(self, name: str) -> float:
+        """Radians in which a player faces before the ball concerns him."""
+        player = self.player(name)
+        if player.facing is not None:
+            return player.facing
+        others = [other.place for other in self.players if other.name != name]
+        x, y = (sum(place[axis] for place in others) / len(others) - player.place[axis] for axis in (0, 1))
+        return math.atan2(y, x)
+
+
+def number_within(value, name: str, where: str, whole: bool = False):
+    """`value` where it is a number within LIMITS[name]; InputError otherwise."""
+    low, high = LIMITS[name]
+    kind = "a whole number" if whole else "a number"
+    good = isinstance(value, (int, float)) and not isinstance(value, bool)
+    good = good and low <= value <= high  # also of no NaN, and of whole numbers that no float can hold
+    if not good or (whole and value != int(value)):
+        raise InputError(where, _said(value), f"{kind} from {low:g} to {high:g}")
+    return int(value) if whole else float(value)
+
+
+def _said(value) -> str:
+    """A value as it is told of, shortened: a whole number of a file may have hundreds of digits."""
+    said = repr(value)
+    return said if len(said) <= 40 else said[:37] + "..."
+
+
+def _check_players(players: tuple[Player, ...]) -> None:
+    if not 2 <= len(players) <= MOST_PLAYERS:
+        raise InputError("players", f"{len(players)} of them", f"2 to {MOST_PLAYERS}")
+    for number, one in enumerate(players):
+        where = f"player {one.name!r}"
+        _check_name(one.name, where)
+        _check_place(one.place, where)
+        _check_part(one.part, one.side, where)
+        if one.facing is not None and not math.isfinite(one.facing):
+            raise InputError(where, f"facing {one.facing}", "an angle")
+        if one.tool is not None and (one.tool.length > LONGEST_TOOL or one.tool.radius > THICKEST_TOOL):
+            most = f"a length up to {LONGEST_TOOL:g} m, a radius up to {THICKEST_TOOL:g} m"
+            raise InputError(f"{where}: tool", str(one.tool), most)
+        if one.height:
+            number_within(one.height, "height", f"{where}: height")
+        for other in players[:number]:
+            _check_pair(one, other)
+
+
+def _check_name(name: str, where: str) -> None:
+    """A player's name is also his files'."""
+    odd = not name.isprintable() or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|')
+    if not name or odd or len(name) > 60 or name.casefold() in RESERVED:
+        expected = "up to 60 letters, digits, blanks between"
+        raise InputError(where, "a name that his files cannot have", expected, "rename him")
+
+
+def _check_pair(one: Player, other: Player) -> None:
+    if one.name.casefold() == other.name.casefold():
+        raise InputError("players", f"two of the name {one.name!r}", "a name for each, for their files")
+    if math.dist(one.place, other.place) < LEAST_APART:
+        found = f"{other.name} and {one.name} {math.dist(one.place, other.place):.2f} m apart"
+        raise InputError("players", found, f"{LEAST_APART} m or more", "move one of them")
+
+
+def _check_place(place: Place, where: str) -> None:
+    if len(place) != 2 or not all(math.isfinite(value) and abs(value) <= LIMITS["metres"][1] for value in place):
+        raise InputError(where, f"the place {place}", f"[x, y] in metres, each up to {LIMITS['metres'][1]:g}")
+
+
+def _check_part(part: str, side: str, where: str) -> None:
+    if not part:
+        raise InputError(where, "no part", "foot, head, chest, hand, tool or a joint's name")
+    if side not in SIDES:
+        raise InputError(where, f"the side {side!r}", "left, right, or nothing for either")
+
+
+def _check_passes(scene: PassScene) -> None:
+    if not scene.passes:
+        raise InputError("passes", "none", "at least one")
+    number_within(scene.repeat, "repeat", "repeat", whole=True)
+    if len(scene.passes) * scene.repeat > MOST_PASSES:
+        count = len(scene.passes) * scene.repeat
+        raise InputError("passes", f"{count} in all", f"{MOST_PASSES} at most", "repeat fewer")
+    names = [one.name for one in scene.players]
+    for number, one in enumerate(scene.passes, start=1):
+        _check_pass(one, f"pass {number}", names, scene)
+    _check_meetings(scene)
+    ends = [*scene.passes, *(scene.passes[:1] if scene.repeat > 1 else ())]
+    for number, (before, after) in enumerate(zip(ends, ends[1:]), start=1):
+        if after.giver != before.receiver:
+            found = f"{after.giver} has not got the ball"
+            again = number == len(scene.passes)
+            where = "pass 1 when repeated" if again else f"pass {number + 1}"
+            raise InputError(where, found, f"from {before.receiver}, to whom pass {number} went", "change one of them")
+
+
+def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:
+    for word, name in (("from", one.giver), ("to", one.receiver)):
+        if name not in names:
+            raise InputError(where, f"{word} {name!r}", f"one of {', '.join(names)}")
+    if one.giver == one.receiver:
+        raise InputError(where, f"from {one.giver} to himself", "two players", "name another receiver")
+    if one.kind not in KINDS:
+        raise InputError(where, f"the kind {one.kind!r}", f"one of {', '.join(KINDS)}")
+    if one.error not in ERRORS:
+        raise InputError(where, f"the error {one.error!r}", "missed or dropped")
+    _check_part("foot" if one.part is None else one.part, one.side or "", where)
+    number_within(one.bounces, "bounces", f"{where}: bounces", whole=True)
+    if one.seconds is not None:
+        number_within(one.seconds, "seconds", f"{where}: seconds")
+    if one.at is not None:
+        _check_place(one.at, where)
+    if one.example is not None:
+        start, end = one.example.start, math.inf if one.example.end is None else one.example.end
+        if not (math.isfinite(start) and 0.0 <= start < end):
+            raise InputError(where, f"an example from {start:g} to {end:g} s", "seconds from 0, the later one last")
+    goal = one.at or scene.player(one.receiver).place
+    far = math.dist(scene.player(one.giver).place, goal)
+    if far > FAR:
+        found = f"{one.receiver} is {far:.0f} m away"
+        raise InputError(where, found, f"{FAR:.0f} m at most", "move one of them nearer")
+
+
+def _check_meetings(scene: PassScene) -> None:
+    """Nobody goes to meet a ball where another one stands by then."""
+    places = {one.name: one.place for one in scene.players}
+    for number, one in enumerate(scene.passes, start=1):
+        places[one.receiver] = one.at or places[one.receiver]
+        for other, place in places.items():
+            if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_APART:
+                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_APART} m or more between them")
+
+
+def _check_numbers(scene: PassScene) -> None:
+    for name in ("fps", "transition", "lead_in", "lead_out"):
+        number_within(getattr(scene, name), name, name)
+    number_within(scene.seed, "seed", "seed", whole=True)
+    for name in ("missed", "dropped"):
+        value = getattr(scene, name)
+        if not (isinstance(value, (int, float)) and 0.0 <= value <= 1.0):
+            raise InputError(f"errors: {name}", f"{value!r}", "a number from 0 to 1")
+    if scene.missed + scene.dropped > 1.0:
+        raise InputError("errors", f"{scene.missed:g} missed and {scene.dropped:g} dropped", "1 in all at most")
+    if scene.directions not in (0, 8):
+        raise InputError("directions", f"{scene.directions!r}", "8, or 0 for any")
+    for bone in scene.weights.bones:
+        if bone not in BONES:
+            raise InputError("weights: bones", f"{bone!r}", f"one of {', '.join(BONES)}", "check the spelling")
+    for entry in fields(Weights):
+        values = [getattr(scene.weights, entry.name)] if entry.name != "bones" else list(scene.weights.bones.values())
+        for value in values:
+            number_within(value, "weight", f"weights: {entry.name}")
+    if scene.net is not None:
+        _check_net(scene.net)
+    _check_serve(scene)
+
+
+def _check_net(net: Net) -> None:
+    for place in (net.start, net.end):
+        _check_place(place, "net")
+    number_within(net.height, "net_height", "net: height")
+    if math.dist(net.start, net.end) < 0.1:
+        raise InputError("net", f"{math.dist(net.start, net.end):.2f} m wide", "two places apart")
+
+
+def _check_serve(scene: PassScene) -> None:
+    serve = scene.serve
+    if serve is None or serve == GROUND:
+        return
+    first = scene.passes[0].giver
+    if isinstance(serve, str):
+        names = [one.name for one in scene.players if one.name != first]
+        if serve not in names:
+            raise InputError("serve", f"{serve!r}", f"ground, [x, y, z], or one of {', '.join(names)}")
+        return
+    if len(serve) != 3 or not all(math.isfinite(v) and abs(v) <= LIMITS["metres"][1] for v in serve) or serve[2] < 0.0:
+        raise InputError("serve", f"{serve}", "[x, y, z] in metres, not below the ground")
+    if math.dist(serve[:2], scene.player(first).place) < LEAST_APART:
+        raise InputError("serve", f"{serve}, where {first} stands", f"{LEAST_APART} m away or more")
+
+
+def served_by(scene: PassScene) -> str:
+    """Who would pass to the first player: the last one of the passes that goes to him, else the last receiver, else the
+    first one of the others."""
+    first = scene.passes[0].giver
+    to_him = [one.giver for one in scene.passes if one.receiver == first]
+    others = [one.receiver for one in scene.passes if one.receiver != first]
+    return to_him[-1] if to_him else others[-1]
+

@@ -1,0 +1,213 @@
+"""SCENE.json: a passing scene as a file (docs/passes/passes.md)."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+
+from ..ball.contact import Tool
+from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
+from ..base.errors import InputError
+from ..files.content import utf8
+from ..files.json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
+
+LARGEST = 10_000_000
+"""Bytes of a file above which it is no scene."""
+
+_OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
+
+
+def read_scene(path: str | os.PathLike) -> PassScene:
+    """The scene that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
+    return parse_scene(utf8(path, "a SCENE.json", LARGEST), str(path))
+
+
+def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
+    """The scene in a text, or in the object that it stands for; `name` stands before what is wrong with it, as
+    InputError."""
+    whole = object_of(said, name, "docs/passes/passes.md") if isinstance(said, str) else said
+    try:
+        return _scene(whole)
+    except InputError as error:
+        raise InputError(name, str(error)) from None
+
+
+def scene_text(scene: PassScene) -> str:
+    """The scene as `read_scene` reads it."""
+    return json.dumps(scene_dict(scene), indent=1, ensure_ascii=False) + "\n"
+
+
+def scene_dict(scene: PassScene) -> dict:
+    """The scene as the object that stands in a file; what is as usual is left out."""
+    usual = PassScene(scene.players, scene.passes)
+    out: dict = {"players": list(map(_player_out, scene.players)), "passes": list(map(_pass_out, scene.passes))}
+    for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
+        if getattr(scene, name) != getattr(usual, name):
+            out[name] = getattr(scene, name)
+    if scene.ball != usual.ball:
+        out["ball"] = {"kind": scene.ball.kind, **scene.ball.changes} if scene.ball.changes else scene.ball.kind
+    if scene.net is not None:
+        out["net"] = {"from": list(scene.net.start), "to": list(scene.net.end), "height": scene.net.height}
+    if scene.serve is not None:
+        out["serve"] = scene.serve if isinstance(scene.serve, str) else list(scene.serve)
+    if scene.missed or scene.dropped:
+        out["errors"] = {"missed": scene.missed, "dropped": scene.dropped}
+    if scene.weights != usual.weights:
+        told = {entry.name: getattr(scene.weights, entry.name) for entry in fields(Weights)}
+        out["weights"] = {**told, "bones": dict(scene.weights.bones)}
+    return out
+
+
+def _player_out(one: Player) -> dict:
+    out: dict = {"name": one.name, "place": list(one.place)}
+    if one.facing is not None:
+        out["facing"] = _in_degrees(one.facing)
+    for name in ("part", "side", "height"):
+        if getattr(one, name) != getattr(Player, name):
+            out[name] = getattr(one, name)
+    if one.tool is not None:
+        out["tool"] = {entry.name: getattr(one.tool, entry.name) for entry in fields(Tool)}
+    return out
+
+
+def _pass_out(one: Pass) -> dict:
+    out: dict = {"from": one.giver, "to": one.receiver}
+    for name in _OF_PASS:
+        value = getattr(one, name)
+        if value != getattr(Pass, name):
+            out[name] = list(value) if name == "at" else value
+    out.pop("example", None)
+    if one.example is not None and one.example.hit is None:  # a hit motion of elsewhere has no file
+        told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
+        out["example"] = {name: value for name, value in told.items() if value is not None}
+    return out
+
+
+# -- reading
+
+
+def _scene(whole) -> PassScene:
+    read = {
+        "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
+        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number,
+        "directions": whole_number,
+        "watch": truth, "weights": _weights,
+    }  # fmt: skip
+    known = {*read, "passes", "defaults", "errors"}
+    check_names(whole, "the scene", known, ("players", "passes"))
+    found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
+    usual = _settings(whole.get("defaults", {}), "defaults")
+    passes = _list_of(lambda value, where: _pass(value, where, usual))(whole["passes"], "passes")
+    return PassScene(passes=passes, **found, **_errors(whole.get("errors", {}), "errors"))
+
+
+def _player(value, where: str) -> Player:
+    read = {
+        "name": text, "place": _place, "facing": _angle, "part": text, "side": text, "tool": _tool,
+        "height": number,
+    }  # fmt: skip
+    check_names(value, where, read, ("name", "place"))
+    return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
+
+
+def _pass(value, where: str, usual: Mapping) -> Pass:
+    check_names(value, where, ("from", "to", *_OF_PASS), ("from", "to"))
+    settings = _settings({name: value[name] for name in value if name in _OF_PASS}, where)
+    giver, receiver = (text(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Pass(giver, receiver, **{**usual, **settings})
+
+
+def _settings(value, where: str) -> dict:
+    """What a pass may say beside its players."""
+    read = {
+        "kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
+        "example": _example, "error": text,
+    }  # fmt: skip
+    check_names(value, where, read, ())
+    return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
+
+
+def _example(value, where: str) -> Example:
+    check_names(value, where, ("clip", "from", "to"), ("clip",))
+    names = {"from": "start", "to": "end"}
+    found = {names[old]: number(value[old], f"{where}: {old}") for old in names if old in value}
+    return Example(text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
+
+
+def _tool(value, where: str) -> Tool:
+    read = {"name": text, "length": number, "radius": number, "reach": number}
+    check_names(value, where, read, ())
+    found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
+    try:
+        return Tool(**found)
+    except InputError as error:
+        raise InputError(where, str(error)) from None
+
+
+def _ball(value, where: str) -> BallChoice:
+    if isinstance(value, str):
+        return BallChoice(value)
+    check_object(value, where)
+    changes = {name: _ball_number(one, f"{where}: {name}") for name, one in value.items() if name != "kind"}
+    return BallChoice(text(value.get("kind", BallChoice.kind), f"{where}: kind"), changes)
+
+
+def _ball_number(value, where: str):
+    return tuple(number(one, where) for one in value) if isinstance(value, (list, tuple)) else number(value, where)
+
+
+def _net(value, where: str) -> Net:
+    check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
+    ends = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Net(*ends, number(value["height"], f"{where}: height"))
+
+
+def _serve(value, where: str):
+    return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
+
+
+def _errors(value, where: str) -> dict[str, float]:
+    check_names(value, where, ("missed", "dropped"), ())
+    return {name: number(one, f"{where}: {name}") for name, one in value.items()}
+
+
+def _weights(value, where: str) -> Weights:
+    names = [entry.name for entry in fields(Weights)]
+    check_names(value, where, names, ())
+    bones = value.get("bones", {})
+    check_object(bones, f"{where}: bones")
+    found = Weights(**{name: number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"})
+    return replace(found, bones={name: number(one, f"{where}: {name}") for name, one in bones.items()})
+
+
+def _list_of(read: Callable) -> Callable:
+    def lines(value, where: str) -> tuple:
+        if not isinstance(value, (list, tuple)):
+            raise InputError(where, shown(value), "a list [...]")
+        one = {"players": "player", "passes": "pass"}[where]
+        return tuple(read(entry, f"{one} {number}") for number, entry in enumerate(value, start=1))
+
+    return lines
+
+
+def _angle(value, where: str) -> float:
+    degrees = number(value, where)
+    return math.radians(degrees if abs(degrees) <= 360.0 else math.remainder(degrees, 360.0))
+
+
+def _in_degrees(angle: float) -> float:
+    """Degrees that are read as just this angle (radians) again, where there are such."""
+    near = math.degrees(angle)
+    tried = (near + ulps * math.ulp(near) for ulps in (0, 1, -1, 2, -2, 3, -3))
+    return next((degrees for degrees in tried if math.radians(degrees) == angle), near)
+
+
+def _place(value, where: str) -> tuple[float, float]:
+    return numbers(value, where, 2, "[x, y] in metres")
+
+
+def _triple(value, where: str) -> tuple[float, float, float]:
+    return numbers(value, where, 3, "[x, y, z]")

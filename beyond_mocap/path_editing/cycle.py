@@ -1,0 +1,228 @@
+"""A motion made to go on: a stretch of it shown again and again until a path is filled (Path editing §3.2.4).
+
+The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion begins
+as recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as it takes, and ends as
+recorded. At each jump one stretch gives way to the other for FADE_SECONDS on either side (`loop_fade`).
+
+How often, and over which loop, is chosen so that the recorded end falls on the end of the path, with all strides made
+longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it kicks), by
+at most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on steadily.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import InputError
+from .loop_fade import faded, faded_steps, rows, window
+from .loops import Loop, find_loops, smooth_speed
+from .path_frame import Residuals
+
+FADE_SECONDS = 0.2
+"""Half a fade, at most; a short loop is faded over its own length."""
+
+MOST_SCALE, KEPT_SCALE = 0.05, 0.009
+"""Shares by which strides are made longer or shorter so that the motion's end falls on the path's: where that end is
+worth it, and where the speed is to be kept."""
+
+MOST_FRAMES = 108_000
+"""An hour at 30 frames per second."""
+
+SAME_LENGTH = 1e-3
+"""Metres that path and motion may differ and count as of one length."""
+
+SEEN = 0.35
+"""How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
+
+_ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
+_KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
+_CREEPS = 0.2  # m/s below which a motion stays where it is
+_OTHERS = 3  # times that another loop than the main one is run through, at most
+
+
+@dataclass(frozen=True, eq=False)
+class Cycled:
+    """residuals: the motion that goes on; seams (S,): its frames that are the first after a jump; scale: how much
+    longer its strides are than recorded; told: lines for the user."""
+
+    residuals: Residuals
+    seams: np.ndarray
+    scale: float = 1.0
+    told: tuple[str, ...] = ()
+
+
+def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None = None) -> Cycled:
+    """The motion repeated until it is `length` metres long; it is returned as it is where it is so long already.
+
+    loops: what `find_loops` found, for callers that keep it. Raises InputError for a motion that has no loop and for a
+    length that is no length.
+    """
+    if not np.isfinite(length) or length <= 0.0:
+        raise InputError("path", f"{length:g} m long", "a length above 0", "draw a longer path")
+    own = float(residuals.step.sum())
+    if abs(own - length) <= SAME_LENGTH:
+        return Cycled(residuals, np.zeros(0, int))
+    found = _good(residuals, find_loops(residuals) if loops is None else loops)
+    most = KEPT_SCALE if found and found[0].ending <= SEEN else MOST_SCALE
+    if length <= (1.0 + most) * own:
+        scale = length / own if length >= (1.0 - most) * own else 1.0
+        return Cycled(_scaled(residuals, scale), np.zeros(0, int), scale, _other_strides(scale))
+    if not found:
+        raise InputError("cycling", _why_not(residuals), "at least one whole stride", _NEXT_STEP)
+    return _filled(residuals, found, length, most)
+
+
+def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: float) -> Cycled:
+    """The motion with as many jumps as `wanted` metres take."""
+    own = float(residuals.step.sum())
+    length = min(wanted, _longest(residuals, loops[0], own))
+    exact = _exact_end(loops, own, length, most)
+    jumps = exact or _steady(residuals, loops, own, length)
+    shown, seams = _jumped(residuals, jumps)
+    told = _seen(jumps)
+    if length < wanted:
+        minutes = len(shown) / residuals.fps / 60.0
+        ends = f"the motion ends after {minutes:.0f} minutes and {length:.0f} m of it"
+        told += (f"the path is {wanted:.0f} m long: {ends}",)
+    if exact:
+        scale = length / float(shown.step.sum())
+        return Cycled(_scaled(shown, scale), seams, scale, (*told, *_other_strides(scale)))
+    arc = np.cumsum(shown.step)
+    count = int(np.argmin(np.abs(arc - length))) + 1
+    scale = length / float(arc[count - 1])
+    if abs(scale - 1.0) > KEPT_SCALE:
+        count, scale = int(np.searchsorted(arc, length + SAME_LENGTH, side="right")), 1.0
+    shown = _scaled(shown.rows(slice(count)), scale)
+    return Cycled(shown, seams[seams < count], scale, (*told, *_cut(loops[0])))
+
+
+def _scaled(residuals: Residuals, scale: float) -> Residuals:
+    return residuals if scale == 1.0 else residuals.changed(step=residuals.step * scale)
+
+
+_NEXT_STEP = "switch cycling off, take a clip that walks or runs for two strides, or shorten the path"
+
+
+def _why_not(residuals: Residuals) -> str:
+    metres, seconds = float(residuals.step.sum()), len(residuals) / residuals.fps
+    if metres < _CREEPS * seconds or not (smooth_speed(residuals) > _CREEPS).any():
+        return f"the motion stays where it is ({metres:.2f} m in {seconds:.1f} s)"
+    return f"no stretch of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
+
+
+def _seen(loops: tuple[Loop, ...]) -> tuple[str, ...]:
+    unlike = max(loop.unlike for loop in loops)
+    if unlike <= SEEN:
+        return ()
+    return (f"no two strides of the motion are alike: where it is repeated, poses are {100 * unlike:.0f} % apart",)
+
+
+def _other_strides(scale: float) -> tuple[str, ...]:
+    if abs(scale - 1.0) <= KEPT_SCALE + 1e-3:
+        return ()
+    word = "longer" if scale > 1.0 else "shorter"
+    return (f"strides are {100 * abs(scale - 1.0):.1f} % {word}, so that the motion ends where the path does",)
+
+
+def _cut(loop: Loop) -> tuple[str, ...]:
+    if loop.ending <= SEEN:
+        return ()
+    return ("no number of loops brings the motion's own end to the path's end: it is cut there",)
+
+
+def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:
+    """The loops that are nearly as good as the best, without those that lead nowhere, as long as they are faded
+    over."""
+    loops = tuple(loop for loop in loops if loop.metres > 0.1)
+    most = _ALSO_GOOD[0] * loops[0].cost + _ALSO_GOOD[1] if loops else 0.0
+    return tuple(_as_long_as_faded(residuals, loop) for loop in loops if loop.cost <= most)
+
+
+def _as_long_as_faded(residuals: Residuals, loop: Loop) -> Loop:
+    reach = _reach(residuals, (loop,))
+    own = residuals.step[np.clip(window(loop, reach), 1, len(residuals) - 1)]
+    return replace(loop, metres=loop.metres + float(faded_steps(residuals, loop, reach).sum() - own.sum()))
+
+
+def _exact_end(loops: tuple[Loop, ...], own: float, length: float, most: float) -> tuple[Loop, ...]:
+    """The jumps with which the motion's own end falls on the path's; () where no strides scaled by at most `most` do
+    it."""
+    best, least = (), np.inf
+    for main in loops:
+        for other in loops:
+            for times in range(_OTHERS + 1 if other is not main else 1):
+                more = length - own - times * other.metres
+                around = more / main.metres
+                for count in {max(int(np.floor(around)), 0), max(int(np.ceil(around)), 0)}:
+                    jumps = _ordered(main, count, other, times)
+                    scale = length / (own + count * main.metres + times * other.metres)
+                    if not jumps or abs(scale - 1.0) > most:
+                        continue
+                    rating = _rating(jumps, scale, loops[0].cost)
+                    if rating < least - 1e-12:
+                        best, least = jumps, rating
+    return best
+
+
+def _rating(jumps: tuple[Loop, ...], scale: float, best: float) -> float:
+    """What speaks against a plan: strides of another length, many jumps, jumps that are seen."""
+    strides = sum(loop.strides for loop in jumps)
+    worse = sum(loop.cost for loop in jumps) / len(jumps) / max(best, 1e-6) - 1.0
+    return _KEEPS * abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + _ALIKE * worse
+
+
+def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...]:
+    """`main` run through `count` times and `other` `times` times, in an order that can be shown; () where none can."""
+    if not count or not times:
+        return (main,) * count + (other,) * times
+    for first, second in (((main, count), (other, times)), ((other, times), (main, count))):
+        if second[0].end - first[0].start >= min(len(first[0]), len(second[0])):
+            return (first[0],) * first[1] + (second[0],) * second[1]
+    return ()
+
+
+def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: float) -> tuple[Loop, ...]:
+    """One loop until the path's end falls into it or before it, so that nobody is cut in the middle of stopping; of a
+    motion that ends as it goes on, until it is long enough."""
+    loop = min(loops, key=lambda loop: _rating((loop,), 1.0, loops[0].cost))
+    outro = float(residuals.step[loop.end + 1 :].sum()) if loop.ending > SEEN else 0.0
+    return (loop,) * max(int(np.ceil((length - own + outro) / loop.metres)), 1)
+
+
+def _longest(residuals: Residuals, loop: Loop, own: float) -> float:
+    """Metres that MOST_FRAMES are good for."""
+    return own + max((MOST_FRAMES - len(residuals)) // len(loop), 1) * loop.metres
+
+
+def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, np.ndarray]:
+    """The motion with all jumps made and faded over, and its seams (S,).
+
+    Every jump over one loop is faded alike, so that it is worked out once: the frames are taken from the motion with
+    one fade for each loop behind it.
+    """
+    count, kinds = len(residuals), list(dict.fromkeys(jumps))
+    reach = _reach(residuals, jumps)
+    begins = [0] + [loop.start for loop in jumps]
+    ends = [loop.end for loop in jumps] + [count]
+    taken = np.concatenate([np.arange(a, b) for a, b in zip(begins, ends)])
+    seams = np.cumsum([b - a for a, b in zip(begins, ends)])[:-1]
+    parts = {name: [values] for name, values in rows(residuals).items()}
+    for loop in kinds:
+        for name, values in faded(residuals, loop, reach).items():
+            parts[name].append(values)
+    kind = np.array([kinds.index(loop) for loop in jumps])
+    around = np.arange(-reach, reach)
+    taken[seams[:, None] + around] = count + kind[:, None] * 2 * reach + around + reach
+    source = np.concatenate([np.arange(count), *(window(loop, reach) for loop in kinds)])
+    values = {name: np.concatenate(each)[taken] for name, each in parts.items()}
+    values["frames"] = residuals.frames[source[taken]]
+    return residuals.changed(**values), seams
+
+
+def _reach(residuals: Residuals, jumps: tuple[Loop, ...]) -> int:
+    """Frames of a fade on either side, so many that no two fades meet."""
+    pieces = [jumps[0].end] + [b.end - a.start for a, b in zip(jumps[:-1], jumps[1:])]
+    pieces.append(len(residuals) - jumps[-1].start)
+    return max(min(int(round(FADE_SECONDS * residuals.fps)), min(pieces) // 2), 1)

@@ -1,0 +1,199 @@
+"""The ground under a rider's feet: where each foot stands, how high and how steep it is there, and in between.
+
+A foot's ground is a plane for as long as it stands, through what lies under its heel and its toe. On its way from one
+stance to the next it goes over from plane to plane, and is lifted where something sticks out in between (a stair's
+edge). So the ground's own roughness never shakes a foot, and stairs have no corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import quintic_step_by_powers
+from ..base.time_series import interpolate
+from ..motion.path.arc_length import ArcLength
+from ..motion.path.path import Path
+from ..base.runs import runs
+from ..motion.path.terrain import Terrain
+
+STEEPEST = 0.7
+"""Slope of the ground under a foot beyond which it is an edge that the foot stands on, flat."""
+
+CLEARANCE, MOST_LIFT = 0.02, 0.35
+"""Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at
+most."""
+
+ABOVE = 1.0
+"""Metres above the path below which the ground is looked for: a bridge overhead is not stood on."""
+
+_EVERY = 0.03  # metres between the places at which a path's height is looked up
+_BEYOND = 1.5  # metres by which its ends are continued
+_ROUNDS = 4
+_EDGE, _SHORT_STEP = 0.2, 0.3  # share of a swing, and metres
+_LONGEST_SWING = 1.5  # seconds; a foot that is longer in the air follows the ground below it
+
+Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""(places (N, 2) m, frames (N,) int in which a foot is there) -> heights (N,) m and slopes (N, 2), by x and by y."""
+
+
+@dataclass(frozen=True, eq=False)
+class Footing:
+    """The ground that two feet are told by. height (T, 2) m at each toe, slope (T, 2, 2) by x and by y, and lift (T, 2)
+    m by which a foot in the air has to go higher."""
+
+    height: np.ndarray
+    slope: np.ndarray
+    lift: np.ndarray
+
+    @property
+    def normal(self) -> np.ndarray:
+        """(T, 2, 3) unit vectors square to the ground."""
+        up = np.concatenate([-self.slope, np.ones((*self.slope.shape[:2], 1))], axis=2)
+        return up / np.linalg.norm(up, axis=2, keepdims=True)
+
+
+def is_level(path: Path, arc: ArcLength) -> bool:
+    """Whether a path has one height all along."""
+    heights = path.at(arc.parameter(np.linspace(0.0, arc.length, 200)))[:, 2]
+    return bool(np.ptp(heights) < 1e-4)
+
+
+def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
+    """The path's own height, level across it. passed (T,) m: where on the path the body is in every frame."""
+    count = int(np.clip(arc.length / _EVERY, 8, 20000)) + 1
+    at = np.linspace(0.0, arc.length, count)
+    u = arc.parameter(at)
+    line, along = path.at(u), path.at(u, 1)
+    level = np.maximum(np.linalg.norm(along[:, :2], axis=1), 1e-9)
+    slope = np.clip(along[:, 2] / level, -3.0, 3.0)
+    table = np.column_stack([line, along[:, :2] / level[:, None], slope])
+    whole = arc.length
+
+    def look(s: np.ndarray) -> np.ndarray:
+        inside = s % whole if path.closed and whole > 0.0 else np.clip(s, 0.0, whole)
+        return interpolate(inside, at, table)
+
+    def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        s = passed[frames].copy()
+        for _ in range(_ROUNDS):
+            here = look(s)
+            ahead = np.sum((places - here[:, :2]) * here[:, 3:5], axis=1)
+            s = s + np.clip(ahead / np.sqrt(1.0 + here[:, 5] ** 2), -0.5, 0.5)
+            if not path.closed:
+                s = np.clip(s, 0.0, whole)
+        here = look(s)
+        ahead = np.sum((places - here[:, :2]) * here[:, 3:5], axis=1)
+        return here[:, 2] + here[:, 5] * np.clip(ahead, -_BEYOND, _BEYOND), here[:, 5:6] * here[:, 3:5]
+
+    return surface
+
+
+def mesh_surface(terrain: Terrain, origin: np.ndarray) -> Surface:
+    """A mesh, and where it ends the height of the path; origin (T, 3) m: where on the path the body is."""
+
+    def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        below = origin[frames, 2] + ABOVE
+        height, normal = terrain.heights(places, below)
+        none = ~np.isfinite(height)
+        if none.any():  # the path may be drawn on a floor below the hill
+            height[none], normal[none] = terrain.heights(places[none], np.full(none.sum(), np.inf))
+            none = ~np.isfinite(height)
+        steep = none | (np.abs(normal[:, 2]) < 0.3)
+        slope = -normal[:, :2] / np.where(steep, 1.0, normal[:, 2])[:, None]
+        return np.where(none, origin[frames, 2], height), np.where(steep[:, None], 0.0, slope)
+
+    return surface
+
+
+def footing(feet: np.ndarray, standing: np.ndarray, clear: np.ndarray, fps: float, surface: Surface) -> Footing:
+    """The ground under two feet.
+
+    feet (T, 2, 2, 2) m: left and right, heel and toe, over the ground; standing (T, 2, 2) bool; clear (T, 2) m: how
+    high each foot was above its own ground.
+    """
+    sides = [_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface) for side in (0, 1)]
+    return Footing(*(np.stack(parts, axis=1) for parts in zip(*sides)))
+
+
+def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, surface: Surface):
+    """Heights (T,), slopes (T, 2) and lifts (T,) of one foot; feet (T, 2, 2), heel and toe."""
+    spans = _stances(stands, fps)
+    firsts, ends = np.array(spans).T
+    middle = (firsts + ends - 1) // 2
+    sums = np.concatenate([np.zeros((1, 2, 2)), np.cumsum(feet, axis=0)])
+    mean = (sums[ends] - sums[firsts]) / (ends - firsts)[:, None, None]
+    height, slope = _planes(mean[:, 0], mean[:, 1], middle, surface)
+    before = np.clip(np.searchsorted(firsts, np.arange(len(feet)), side="right") - 1, 0, len(spans) - 1)
+    after = np.minimum(before + 1, len(spans) - 1)
+    way = (np.arange(len(feet)) - ends[before] + 1) / np.maximum(firsts[after] - ends[before] + 1, 1)
+    way = np.clip(np.where(after == before, 0.0, way), 0.0, 1.0)
+    toe = feet[:, 1]
+    share = _gone(toe, mean[before, 1], mean[after, 1], way)
+    a, b = (height[at] + np.sum(slope[at] * (toe - mean[at, 1]), axis=1) for at in (before, after))
+    found = a + (b - a) * share
+    tilt = slope[before] + (slope[after] - slope[before]) * share[:, None]
+    return found, tilt, _clearing(feet, found, tilt, clear, way, before, surface)
+
+
+def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time,
+    `way` (T,), where it leaves and arrives and where it stays about where it is."""
+    by_time = quintic_step_by_powers(way)
+    step = there - here
+    length = np.sum(step * step, axis=1)
+    by_place = np.clip(np.sum((toe - here) * step, axis=1) / np.maximum(length, 1e-9), 0.0, 1.0)
+    x = np.clip(np.minimum(way, 1.0 - way) / _EDGE, 0.0, 1.0) * np.clip(length / _SHORT_STEP**2, 0.0, 1.0)
+    return by_time + (by_place - by_time) * x * x * (3.0 - 2.0 * x)
+
+
+def _stances(stands: np.ndarray, fps: float) -> list[tuple[int, int]]:
+    """(first, end) of every stance (T,), and moments in between where a foot is long in the air."""
+    count, longest = len(stands), max(int(_LONGEST_SWING * fps), 1)
+    spans = runs(stands)
+    edges = [(-1, 0), *spans, (count, count)]
+    for (_, last), (first, _) in zip(edges[:-1], edges[1:]):
+        gap = first - last
+        inner = np.linspace(last, first, gap // longest + 2)[1:-1].astype(int) if gap > longest else []
+        ends = [at for at in (last if last == 0 else None, first - 1 if first == count else None) if at is not None]
+        spans += [(int(at), int(at) + 1) for at in {*inner, *ends} if gap > 0]
+    return sorted(set(spans))
+
+
+def _planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Height (S,) at the toe and slope (S, 2) of the ground under feet with heels and toes (S, 2)."""
+    high, slope = surface(np.concatenate([toe, heel]), np.tile(frames, 2))
+    (at_toe, at_heel), slope = np.split(high, 2), 0.5 * np.add(*np.split(slope, 2))
+    along = toe - heel
+    length = np.linalg.norm(along, axis=1)
+    known = length > 0.03
+    along = along / np.maximum(length, 1e-9)[:, None]
+    rise = np.where(known, (at_toe - at_heel) / np.maximum(length, 1e-9), 0.0)
+    own = np.sum(slope * along, axis=1)
+    edge = np.abs(rise) > STEEPEST
+    slope = slope + np.where(known, rise - own, 0.0)[:, None] * along
+    slope = np.where(edge[:, None], 0.0, np.clip(slope, -STEEPEST, STEEPEST))
+    return np.where(edge, np.maximum(at_toe, at_heel), at_toe), slope
+
+
+def _clearing(
+    feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray, which: np.ndarray,
+    surface: Surface,
+) -> np.ndarray:
+    """(T,) metres by which a foot in the air goes higher so that neither end of it is in the ground: a bump a swing."""
+    lift = np.zeros(len(feet))
+    aloft = np.flatnonzero((way > 0.0) & (way < 1.0))
+    if not len(aloft):
+        return lift
+    real, _ = surface(feet[aloft].reshape(-1, 2), np.repeat(aloft, 2))
+    lever = np.sum(slope[aloft, None] * (feet[aloft] - feet[aloft, 1:]), axis=2)
+    lacks = real.reshape(-1, 2) - (height[aloft, None] + lever)
+    lacks = lacks.max(axis=1) + np.minimum(clear[aloft], CLEARANCE) - clear[aloft]
+    bump = 16.0 * (way * (1.0 - way)) ** 2
+    asked = np.maximum(lacks, 0.0) / np.maximum(bump[aloft], 0.15)
+    most = np.zeros(which.max() + 1)
+    np.maximum.at(most, which[aloft], asked)
+    lift[aloft] = (np.minimum(most, MOST_LIFT)[which] * bump)[aloft]
+    return lift

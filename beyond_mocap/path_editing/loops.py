@@ -1,0 +1,274 @@
+"""Where a motion can be repeated: pairs of frames at which the body does the same thing, a stride or more apart.
+
+Compared are places and velocities of the main joints as seen from the path's moving frame, travelling with the body, in
+a window around both frames; which soles stand; and how far the body lies off its path. A motion graph (Kovar et al.
+2002) finds its transitions alike. The search is bounded: rough over at most two and a half million pairs, then exact
+around the best two dozen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from ..base.errors import InputError
+from ..motion.humanoid import identify
+from ..motion.motion import pose_kinematics
+from ..motion.skeleton import Skeleton
+from .path_frame import Residuals
+
+WINDOW_SECONDS = 0.12
+"""Pairs are compared over so much before and after."""
+
+_VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
+_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24
+_STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
+_SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which nobody loops: a stop is no gait
+_LABEL = 0.06  # metres that a wrong sole costs
+_FEET = 0.5  # what a metre costs by which feet that stand at both ends stand elsewhere: they would be moved there
+_CROWDED = 0.05  # metres that it costs to have no frames to fade over
+_VARIETY = 0.3  # how much better one more stride makes a loop of one stride
+_MOST = 0.6  # how unlike a loop's ends are at most
+_EACH_FOOT = 0.08  # of a loop's time that each foot stands alone at least: who jumps with both feet has no stride
+_JOINTS = 16  # compared at most, of a body that is not a human one
+_SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
+
+    apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
+    unlike: the same as a share of how far apart any two moments of the motion are; cost: the same in metres with what
+    else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending:
+    how unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
+    """
+
+    start: int
+    end: int
+    apart: float
+    unlike: float
+    cost: float
+    metres: float
+    strides: float
+    ending: float
+
+    def __len__(self) -> int:
+        return self.end - self.start
+
+
+def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
+    """The best loop of each number of strides, the best of all first; () for a motion that does not move on, or moves
+    on for less than a stride."""
+    pace = smooth_speed(residuals)
+    moving = pace > _SLOWEST
+    if not moving.any():
+        return ()
+    features = _features(residuals)
+    stride = stride_frames(residuals, features)
+    least = int(np.ceil(_STRIDE_SHARE * stride)) if stride else 0
+    if not 0 < least < len(features) - 1:
+        return ()
+    free = pace >= max(_SLOWEST, _SLOW_SHARE * float(np.median(pace[moving])))
+    tried = _rough(features, residuals, free, least, stride)
+    usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
+    feet = _feet(residuals.skeleton, features)
+    found = [_exact(features, residuals, pair, free, least, stride, usual, feet) for pair in tried]
+    found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
+    best: dict[int, Loop] = {}
+    for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
+        best.setdefault(max(int(round(loop.strides)), 1), loop)
+    return tuple(best.values())
+
+
+def smooth_speed(residuals: Residuals) -> np.ndarray:
+    """(T,) metres per second along the path, the mean of half a second."""
+    speed = residuals.step * residuals.fps
+    if len(speed) > 1:
+        speed = np.concatenate([speed[1:2], speed[1:]])
+    return uniform_filter1d(speed, 2 * int(0.25 * residuals.fps) + 1, mode="nearest")
+
+
+def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> float | None:
+    """Frames of a stride, from one landing of a foot to its next: the median over the motion while it moves on; None
+    without any.
+
+    Told by the soles, which land and leave; of a motion whose soles say nothing, by the lag after which its poses come
+    again; of a single stride by its two steps.
+    """
+    moving = smooth_speed(residuals) > _SLOWEST
+    edges = np.diff(residuals.standing.any(axis=2).astype(np.int8), axis=0)
+    at = [[np.flatnonzero((edges[:, side] == kind) & moving[1:]) for side in (0, 1)] for kind in (1, -1)]
+    whole = _usual(np.concatenate([np.diff(sides) for pair in at for sides in pair]), residuals.fps)
+    if whole is not None:
+        return whole
+    again = _period(_features(residuals) if features is None else features, moving, residuals.fps)
+    if again is not None:
+        return again
+    return _usual(np.concatenate([2.0 * np.abs(pair[0][:, None] - pair[1]).ravel() for pair in at]), residuals.fps)
+
+
+def _usual(frames: np.ndarray, fps: float) -> float | None:
+    """The median of those that may be a stride's."""
+    kept = frames[(frames > _SHORTEST_STRIDE * fps) & (frames < _LONGEST_STRIDE * fps)]
+    return float(np.median(kept)) if len(kept) else None
+
+
+def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | None:
+    """The first lag, in frames, after which poses come again at half their usual distance or less; None without one."""
+    shown = features[moving]
+    lags = np.arange(int(_SHORTEST_STRIDE * fps), min(int(_LONGEST_STRIDE * fps), len(shown) - 1) + 1)
+    if len(lags) < 3:
+        return None
+    apart = np.array([np.mean(np.sum((shown[lag:] - shown[:-lag]) ** 2, axis=1)) for lag in lags])
+    inner, usual = apart[1:-1], 2.0 * shown.var(axis=0).sum()
+    lowest = (inner <= apart[:-2]) & (inner < apart[2:]) & (inner < 0.25 * usual)
+    return float(lags[1:-1][lowest][0]) if lowest.any() else None
+
+
+def _features(residuals: Residuals) -> np.ndarray:
+    """(T, D) metres: main joints' places across and above the path, along it from the pelvis, and what they move over
+    the ground in _VELOCITY_SECONDS; scaled so that a distance is the root mean square over joints."""
+    joints = _main_joints(residuals.skeleton)
+    root = residuals.place * [0.0, 1.0, 1.0]
+    places = pose_kinematics(residuals.skeleton, root, residuals.rotations)[0][:, joints]
+    along = np.cumsum(residuals.step) + residuals.place[:, 0]
+    ground = places + along[:, None, None] * [1.0, 0.0, 0.0]
+    velocity = _slope(ground, max(1, int(round(residuals.fps / 60.0)))) * residuals.fps
+    both = np.concatenate([places, _VELOCITY_SECONDS * velocity], axis=1)
+    return both.reshape(len(both), -1) / np.sqrt(len(joints))
+
+
+def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
+    """(T, 2, 2) metres along and across the path from the pelvis to the left and right foot; None of an unknown
+    body."""
+    try:
+        body = identify(skeleton)
+    except InputError:
+        return None
+    joints = _main_joints(skeleton)
+    at = [3 * joints.index(limb.toe_or_foot) for limb in (body.left, body.right)]
+    return np.sqrt(len(joints)) * np.stack([features[:, k : k + 2] for k in at], axis=1)
+
+
+def _slope(values: np.ndarray, reach: int) -> np.ndarray:
+    """Change per frame (T, ...) of values (T, ...), by differences over `reach` frames to either side."""
+    at = np.arange(len(values))
+    after, before = np.minimum(at + reach, len(values) - 1), np.maximum(at - reach, 0)
+    return (values[after] - values[before]) / np.maximum(after - before, 1).reshape(-1, *[1] * (values.ndim - 1))
+
+
+def _main_joints(skeleton: Skeleton) -> list[int]:
+    """Those that tell a pose: hips, chest, head, knees, feet, hands; of an unknown body, some spread over it."""
+    try:
+        body = identify(skeleton)
+    except InputError:
+        return np.unique(np.linspace(0, len(skeleton) - 1, min(_JOINTS, len(skeleton))).round().astype(int)).tolist()
+    limbs = [(limb.lower_leg, limb.foot, limb.toe, limb.lower_arm, limb.hand) for limb in (body.left, body.right)]
+    named = (body.hips, body.chest, body.head, *limbs[0], *limbs[1])
+    return sorted({joint for joint in named if joint is not None})
+
+
+def _strides(standing: np.ndarray, loop: Loop) -> bool:
+    """Whether one foot after the other carries the body in a loop, or nothing is known of the feet."""
+    left, right = np.moveaxis(standing[loop.start : loop.end].any(axis=2), 1, 0)
+    alone = min(np.mean(left & ~right), np.mean(right & ~left))
+    return bool(alone >= _EACH_FOOT or not standing.any())
+
+
+def _rough(
+    features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int, stride: float
+) -> list[tuple[int, int]]:
+    """Up to _TRIED pairs (start, end) of frames, all well apart from one another, that look alike at a low rate."""
+    count, fps = len(features), residuals.fps
+    every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
+    ends = np.arange(0, count, every)
+    starts = ends[:: max(-(-(len(ends) ** 2) // _PAIRS), 1)]
+    starts, ends = starts[free[starts]], ends[free[ends]]
+    if not len(starts) or not len(ends):
+        return []
+    a, b = (features[at].astype(np.float32) for at in (starts, ends))
+    square = (a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T)
+    score = np.sqrt(np.maximum(square, 0.0))
+    length = (ends[None] - starts[:, None]).astype(np.float32)
+    still = np.cumsum(~free, dtype=np.float32)
+    score *= _liking(length, still[ends][None] - still[starts][:, None], stride)
+    score[length < least] = np.inf
+    order = np.argpartition(score, min(2000, score.size - 1), axis=None)[:2000]
+    order = order[np.argsort(score.flat[order], kind="stable")]
+    row, column = np.unravel_index(order[np.isfinite(score.flat[order])], score.shape)
+    return _apart(np.stack([starts[row], ends[column]], axis=1), 0.25 * stride)
+
+
+def _liking(length: np.ndarray, still: np.ndarray, stride: float) -> np.ndarray:
+    """What distances of loops are multiplied by: long ones are liked better, those that stand still in between less."""
+    return (1.0 + _VARIETY * stride / np.maximum(length, 1.0)) * (1.0 + 2.0 * still / np.maximum(length, 1.0))
+
+
+def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
+    """The first _TRIED pairs (K, 2), best first, of which no two are within `reach` frames in both start and end."""
+    kept: list[tuple[int, int]] = []
+    while len(pairs) and len(kept) < _TRIED:
+        kept.append((int(pairs[0, 0]), int(pairs[0, 1])))
+        pairs = pairs[np.abs(pairs - pairs[0]).max(axis=1) > reach]
+    return kept
+
+
+def _exact(
+    features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int, stride: float,
+    usual: float, feet: np.ndarray | None,
+) -> Loop | None:
+    """The best loop around a rough pair, compared over windows at the full rate; usual: metres that any two moments are
+    apart; feet (T, 2, 2) m: see `_feet`."""
+    count, fps = len(features), residuals.fps
+    reach, window = int(np.ceil(fps / 12.0)), int(round(WINDOW_SECONDS * fps))
+    start, end = (at + np.arange(-reach - window, reach + window + 1) for at in pair)
+    inside = [(at >= 0) & (at < count) for at in (start, end)]
+    known = inside[0][:, None] & inside[1][None]
+    start, end = (np.clip(at, 0, count - 1) for at in (start, end))
+    a, b = features[start], features[end]
+    square = np.maximum((a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T), 0.0)
+    wrong, moved = _soles_apart(residuals, feet, start, end)
+    total, wrong, moved, seen = (
+        _along_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, moved, 1.0 * known)
+    )
+    seen = np.maximum(seen, 1e-9)
+    middle = slice(window, len(a) - window)
+    start, end = start[middle][:, None], end[middle][None]
+    length = end - start
+    still = np.cumsum(~free)
+    apart = np.sqrt(total / seen)
+    cost = apart + (_LABEL * wrong + _FEET * moved) / seen + _CROWDED * (1.0 - seen / (2 * window + 1))
+    cost = cost * _liking(length, still[end] - still[start], stride)
+    cost[~(known[middle, middle] & (length >= least) & free[start] & free[end])] = np.inf
+    at = np.unravel_index(np.argmin(cost), cost.shape)
+    if not np.isfinite(cost[at]):
+        return None
+    first, last = int(start[at[0], 0]), int(end[0, at[1]])
+    metres = float(residuals.step[first + 1 : last + 1].sum())
+    off = float(apart[at])
+    ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
+    usual = max(usual, 1e-9)
+    return Loop(first, last, off, off / usual, float(cost[at]), metres, (last - first) / stride, ending / usual)
+
+
+def _soles_apart(
+    residuals: Residuals, feet: np.ndarray | None, start: np.ndarray, end: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which
+    feet that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
+    soles = residuals.standing.reshape(len(residuals), 4)
+    wrong = (soles[start][:, None] != soles[end][None]).mean(axis=2)
+    if feet is None:
+        return wrong, np.zeros_like(wrong)
+    stands = residuals.standing.any(axis=2)
+    off = np.linalg.norm(feet[start][:, None] - feet[end][None], axis=-1)
+    return wrong, np.max(np.where(stands[start][:, None] & stands[end][None], off, 0.0), axis=2)
+
+
+def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
+    """Sums of a square array over 2 * window + 1 places along its diagonals, where they lie inside."""
+    size = len(values) - 2 * window
+    return sum(values[k : k + size, k : k + size] for k in range(2 * window + 1))

@@ -1,0 +1,212 @@
+"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; and B-splines
+by their control points (Path editing §4.6.6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.time_series import interpolate
+from ..base.vectors import distance_along, unit_vectors
+from ..base.errors import InputError
+from ..motion.path.arc_length import ArcLength
+from ..motion.path.path import Path, SplinePath
+from ..base.runs import runs
+from ..motion.path.smooth_spline import smoothing_spline
+
+ROUNDING = 0.15
+"""Metres over which corners are rounded, some."""
+
+SHORTEST = 0.2
+"""Metres that a line has at least."""
+
+_SAMPLE = 1 / 4  # of the rounding, between samples of the line
+_PIECE = 1 / 2  # of the rounding, a piece of the spline
+_LONGEST = 5000  # roundings: longer lines are rounded more
+_HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
+_LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3
+_ORDER = 3  # the change of the bend is what costs, so that a bend that stays is kept to the line's very ends
+
+
+def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
+    """The path along a polyline (N, 3) in metres, its parameter about metres along it.
+
+    name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres;
+    smooth lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends
+    exactly. closed: the last point is joined to the first. InputError for fewer than two different points, values that
+    are not finite, lines shorter than SHORTEST.
+    """
+    line = _checked(line, name, closed)
+    length = distance_along(line)[-1]
+    rounding = max(min(rounding, length / 12), length / _LONGEST)
+    sampled, along = _resampled(_thinned(line, rounding * _SAMPLE), rounding * _SAMPLE)
+    sampled = _with_hairpins(sampled, along, rounding, closed)
+    pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
+    if closed:
+        spline = smoothing_spline(
+            sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True, domain=(0.0, along[-1])
+        )
+    else:
+        weights = np.ones(len(along))
+        spline = smoothing_spline(sampled, along, pieces, rounding, _ORDER, weights, ends_met=True)
+    return SplinePath(*spline, closed=closed)
+
+
+def b_spline(points: np.ndarray, degree: int) -> SplinePath:
+    """The B-spline of control points (P, 3) in metres that begins at the first and ends at the last; its parameter is 0
+    to 1.
+
+    Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which
+    does not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control
+    points.
+    """
+    points = np.asarray(points, dtype=float)
+    _checked(points, "control points", closed=False)
+    _check_degree(len(points), degree)
+    return SplinePath(_even_knots(len(points), degree), points, degree)
+
+
+def control_points(path: Path, count: int, degree: int) -> np.ndarray:
+    """The control points (count, 3) in metres of the B-spline nearest to a path, whose ends it meets; see `b_spline`.
+
+    Least squares over even steps of arc length, so that control points lie even too. InputError as there for the
+    degree.
+    """
+    from scipy.interpolate import BSpline
+
+    _check_degree(count, degree)
+    places, share = _even_places(path, max(8 * count, 200))
+    origin = places.mean(axis=0)
+    places = places - origin
+    design = BSpline.design_matrix(share, _even_knots(count, degree), degree).toarray()
+    ends = places[[0, -1]]
+    inner = np.linalg.lstsq(design[:, 1:-1], places - design[:, [0, -1]] @ ends, rcond=None)[0]
+    return np.concatenate([ends[:1], inner, ends[1:]]) + origin
+
+
+def straight(path: Path, count: int) -> np.ndarray:
+    """Even control points (count, 3) in metres from where a path begins to where it ends: a neutral start (§4.6.6).
+
+    Where it ends where it begins, to its farthest place. InputError for fewer than two.
+    """
+    _check_degree(count, 1)
+    places, _ = _even_places(path, 200)
+    first, last = places[0], places[-1]
+    if np.linalg.norm(last - first) < SHORTEST:
+        last = places[np.argmax(np.linalg.norm(places - first, axis=1))]
+    return first + np.linspace(0.0, 1.0, count)[:, None] * (last - first)
+
+
+def _check_degree(count: int, degree: int) -> None:
+    """InputError where a B-spline of `count` control points cannot have this degree."""
+    if not 1 <= degree < count:
+        raise InputError(
+            "control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
+            "take more points or a lower degree",
+        )
+
+
+def _even_knots(count: int, degree: int) -> np.ndarray:
+    """(count + degree + 1,) knots from 0 to 1."""
+    return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count - degree + 1), np.ones(degree)])
+
+
+def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places (count, 3) at even steps of arc length, and the share (count,) of the way."""
+    share, arc = np.linspace(0.0, 1.0, count), ArcLength(path)
+    u = arc.parameter(share * arc.length)
+    u[-1] = path.domain[1] - (1e-12 * (path.domain[1] - path.domain[0]) if path.closed else 0.0)
+    return path.at(u), share
+
+
+def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
+    """The line without points that repeat the one before, closed where asked; or InputError."""
+    line = np.asarray(line, dtype=float)
+    if line.ndim != 2 or line.shape[1] != 3:
+        raise InputError(name, f"an array of shape {line.shape}", "points of three coordinates")
+    if not np.isfinite(line).all():
+        where = np.flatnonzero(~np.isfinite(line).all(axis=1))[0]
+        raise InputError(name, f"point {where + 1} is not finite", "metres")
+    if closed and len(line):
+        line = np.concatenate([line, line[:1]])
+    if len(line):
+        line = line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)]
+    if len(line) < 2:
+        raise InputError(name, "all its points are one", "two different points at least", "draw it longer")
+    if (length := distance_along(line)[-1]) < SHORTEST:
+        raise InputError(name, f"it is {length:.3g} m long", f"{SHORTEST} m at least", "draw it longer")
+    return line
+
+
+def _thinned(line: np.ndarray, step: float) -> np.ndarray:
+    """Points denser than `step` metres averaged over it, so that their noise does not make the line longer."""
+    along = distance_along(line)
+    cell = np.floor(along / step).astype(int)
+    first = np.flatnonzero(np.diff(cell, prepend=-1))
+    count = np.diff(np.append(first, len(line)))
+    if count.max() == 1:
+        return line
+    means = np.add.reduceat(line, first, axis=0) / count[:, None]
+    means[0], means[-1] = line[0], line[-1]
+    return means
+
+
+def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed: bool) -> np.ndarray:
+    """Samples (M, 3) with room to turn round where the line, `along` (M,) metres, turns by more than a right angle.
+
+    On the way in they swing out to the outer side, on the way back to the inner one, by up to `rounding` metres: a line
+    that goes back where it came from would have to stop and turn on the spot.
+    """
+    step, count = along[1], len(line) - closed
+    reach = max(int(round(rounding / step)), 1)
+    inner = np.arange(count) if closed else np.arange(reach, count - reach)
+    came, goes = _directions(line, inner, reach, count)
+    excess = np.zeros(count)
+    excess[inner] = np.arccos(np.clip(np.einsum("mi,mi->m", came, goes), -1.0, 1.0)) / (np.pi / 2) - 1.0
+    first = int(np.argmin(excess)) if closed else 0  # no turn there
+    turns = [np.arange(*turn) + first for turn in runs(np.roll(excess, -first) > 0.0)]
+    if not turns:
+        return line
+    places = step * np.array([np.average(turn, weights=excess[turn % count]) for turn in turns])
+    out = line.copy()
+    for turn, place, room in zip(turns, places, _room(places, along[-1], closed)):
+        peak, wide = turn[np.argmax(excess[turn % count])] % count, min(_HAIRPIN * rounding, room)
+        off = along - place
+        if closed:
+            off = (off + along[-1] / 2) % along[-1] - along[-1] / 2
+        off = np.clip(off / wide, -1.0, 1.0)
+        swing = excess[peak] * wide / _HAIRPIN * off * (1.0 - off**2) ** 3 / _LARGEST
+        out += swing[:, None] * _aside(came[peak - inner[0]], goes[peak - inner[0]])
+    return out
+
+
+def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
+
+    period: samples in a round, for closed lines.
+    """
+    before, after = (at - reach) % period, (at + reach) % period
+    chords = line[at] - line[before], line[after] - line[at]
+    return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
+
+
+def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
+    """Metres (P,) from each turn to the nearest other or to the line's end; places (P,) metres along it, rising."""
+    before = places[-1] - length if closed else 0.0
+    after = places[0] + length if closed else length
+    return np.minimum(np.diff(places, prepend=before), np.diff(places, append=after))
+
+
+def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
+    """The horizontal unit vector (3,) to the side to which a line turns that came and goes in directions (3,)."""
+    side = np.array([goes[1] - came[1], came[0] - goes[0], 0.0])  # left of the turn's tip
+    size = np.linalg.norm(side)
+    side = side / size if size > 1e-6 else np.array([1.0, 0.0, 0.0])
+    return -side if came[0] * goes[1] - came[1] * goes[0] < -1e-9 else side
+
+
+def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Even samples (M, 3) of a polyline about `step` metres apart, and metres (M,) along it."""
+    along = distance_along(line)
+    even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
+    return interpolate(even, along, line), even

@@ -1,0 +1,239 @@
+"""How well a recording rides another path: on the path, at its speed, on its feet, smoothly; its own figures beside.
+
+`source` and `ridden` are what the recipe `ride` takes and gives (`RideSource`, `Ridden`); only their arrays are used.
+Definitions are those of `../shared/metrics.md`: the root is the pelvis behind a zero-phase Hann window of 1.5 s.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..base.time_series import time_derivative
+from ..motion import contacts as foot_contacts
+from ..motion.humanoid import identify
+from ..motion.motion import Motion, forward_kinematics
+from ..motion.track import zero_phase_hann
+from ..synthesis.quality import feet, jerk, root
+
+MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
+_DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
+_MOVING = 0.3  # m/s below which a body stands, and no speed is kept
+
+
+def figures(source, ridden, path, ground=None) -> dict:
+    """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
+
+    path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins
+    anew with its path only the first time is looked at: the others are the same, with a cut between.
+    """
+    ridden = ridden.once
+    pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
+    frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
+    fps = ridden.motion.fps
+    out = {
+        "length_m": float(np.ptp(ridden.arc)) if len(ridden.arc) else 0.0,
+        "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
+        "root_error_own_m": _spread(_own_error(source, own)),
+        "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
+        "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
+        "seam_jerk": _seams(source, ridden, own, pelvis),
+        "ground_mm": None, "skate": None, "knee_jerk_ratio": None, "foot_correction_m": None, "ik_miss_share": None,
+    }  # fmt: skip
+    if not source.humanoid:
+        return out
+    return {**out, **_feet(source, ridden, frames, ground), "knee_jerk_ratio": knee_jerk(source, ridden, frames)}
+
+
+def _pelvis(motion: Motion, humanoid: bool) -> np.ndarray:
+    """Places (T, 3) m of the hips, of the root where there are none."""
+    hips = identify(motion.skeleton).hips if humanoid else 0
+    return motion.root_positions if hips == 0 else forward_kinematics(motion)[0][:, hips]
+
+
+def _own_error(source, own: np.ndarray) -> np.ndarray:
+    """Distance (T,) m of the recording's root from its own path."""
+    times = np.arange(len(own)) / source.motion.fps
+    return root.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
+
+
+def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndarray:
+    """Distance (T,) m of the root, pelvis (T, 2) behind the window, from the path's nearest point, behind the same
+    window.
+
+    origin (T, 2) m: where on the path the ride was; what of the path it never came to is left as it is.
+    """
+    low, high = path.domain
+    line = path.at(np.linspace(low, high, 4001))[:, :2]
+    way = np.concatenate([zero_phase_hann(origin, fps, root.ROOT_WINDOW), line])
+    known = _filled(way[: len(origin)])
+    return cKDTree(known).query(zero_phase_hann(pelvis, fps, root.ROOT_WINDOW))[0]
+
+
+def _filled(line: np.ndarray) -> np.ndarray:
+    """Places (M, 2) at most 1 cm apart along a line (T, 2); jumps of more than half a metre are left open."""
+    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    counts = np.where(steps < 0.5, np.maximum(steps / _DENSE, 1.0), 1.0).astype(int)
+    shares = [np.arange(count) / count for count in counts]
+    parts = [a + share[:, None] * (b - a) for a, b, share in zip(line[:-1], line[1:], shares)]
+    return np.concatenate([*parts, line[-1:]])
+
+
+def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.ndarray) -> dict:
+    """Arc length per frame against the recording's at the frame that is shown: shares by which it is off, where the
+    recording moves and nothing is joined. Played twice as fast it is off by 1.
+
+    path: of the path; body: of the pelvis behind the window, which in bends is shorter by what the window cuts off.
+    """
+    fps, there = ridden.motion.fps, np.arange(len(frames) - 1)
+    middle = 0.5 * (ridden.frames[1:] + ridden.frames[:-1])
+    ends = np.clip((middle + [[-0.5], [0.5]]) / source.motion.fps, *source.path.domain)
+    step, asked = np.diff(ridden.arc), source.arc.at(ends[1]) - source.arc.at(ends[0])
+    free = (asked * fps > _MOVING) & (np.diff(ridden.frames) > 0) & (step > 0)
+    for seam in np.asarray(ridden.seams, int):
+        free &= np.abs(there - seam) > 0.75 * fps
+    path = np.abs(step[free] / asked[free] - 1.0)
+    speeds = [
+        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, root.ROOT_WINDOW), rate), axis=1)
+        for p, rate in ((pelvis, fps), (own, source.motion.fps))
+    ]
+    mine, his = speeds[0][:-1][free], speeds[1][frames][:-1][free]
+    body = np.abs(mine / np.maximum(his, 1e-9) - 1.0)
+    total = float(mine.sum() / his.sum() - 1.0) if len(mine) and his.sum() > 0 else np.nan
+    return {"path": _spread(path), "body": {**_spread(body), "total": total}}
+
+
+def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
+    """Jerk at the seams of a ride that cycles, against what the recording itself has at that speed."""
+    seams = np.asarray(ridden.seams, int)
+    mine, his = (jerk.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
+    speed = root.travel_speed(own[:, :2], source.motion.fps)
+    windows, at = jerk.uncut_windows(his, speed)
+    if not len(windows) or not len(seams):
+        return {"seams": len(seams), "max": None, "median": None}
+    real = jerk.real_p95(windows, at)
+    ratios = jerk.seam_ratios(mine, seams, root.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
+    return {"seams": len(seams), "max": float(ratios.max()), "median": float(np.median(ratios))}
+
+
+def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
+    """Skate on carried contacts in the recording, before planting and after; stances, the ground, what planting did."""
+    points, own_points = carried(ridden), source.standing
+    own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
+    used = np.unique(frames)
+    skate = {
+        **_skate("", mine, points, ridden.motion.fps),
+        **_skate("source_", own, own_points, source.motion.fps, used),
+        **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
+    }
+    way = source.path.at(np.arange(len(own)) / source.motion.fps)
+    stood, own_stood = points.all(axis=2), own_points.all(axis=2)
+    correction = ridden.correction[points.any(axis=2)]
+    return {
+        "skate": skate,
+        "ground_mm": {
+            **_ground("", mine, stood, ridden.origin, source.motion, ground),
+            **_ground("source_", own, own_stood, way, source.motion, None),
+        },
+        "foot_correction_m": _spread(correction) if len(correction) else None,
+        "ik_miss_share": float(np.mean(ridden.miss.max(axis=1) > MISSED)),
+    }
+
+
+def carried(ridden) -> np.ndarray:
+    """(T, 2, 2) bool: which points of the feet stand, without the frames in which the ride begins again at the path's
+    beginning: nobody stands while he is set elsewhere."""
+    points = ridden.standing.copy()
+    points[1:][np.diff(ridden.arc) < 0.0] = False
+    return points
+
+
+def _foot_places(motion: Motion) -> np.ndarray:
+    """(T, 2, 2, 3) m: side, heel and toe."""
+    return forward_kinematics(motion)[0][:, feet.foot_joints(motion.skeleton)]
+
+
+def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: np.ndarray | None = None) -> dict:
+    """Mean speed of standing feet (flat: heel and toe stand) and of standing points, cm/s; how far toes travel within a
+    stance, mm. used: frames that count, None for all."""
+    flat = points.all(axis=2)
+    speeds = feet.contact_speeds(places, flat, fps)
+    point = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) * fps
+    point = np.where(points[:-1] & points[1:], point, np.nan)
+    if used is not None:
+        kept = used[used < len(speeds)]
+        speeds, point = speeds[kept], point[kept]
+    travel = feet.stance_travel(places[:, :, 1], feet.stances(flat))
+    return {
+        f"{name}contact_cm_s": 100.0 * _mean(speeds),
+        f"{name}point_cm_s": 100.0 * _mean(point),
+        f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
+        f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float)),
+    }
+
+
+def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray, recording: Motion, ground) -> dict:
+    """Heights of soles above the surface, mm: the deepest of any foot, the highest and the usual of standing ones.
+
+    The surface is that of `ground` under each foot; without it the path's own height where the path, origin (T, 3) m,
+    is nearest. A sole's height is that of its joints less what they have in the recording while the foot stands flat.
+    """
+    surface = _surface(places, origin, ground)
+    above = places - surface[..., None] * [0.0, 0.0, 1.0]
+    own_floor, toe_rest = foot_contacts.floor_height(recording), foot_contacts.recorded_floor(recording)[1]
+    ankle = foot_contacts.sole_height(recording.skeleton)  # of a flat foot without toes
+    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
+    heel_rest = max(rest, ankle) + toe_rest - ankle
+    lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - heel_rest)
+    standing = lower[flat & np.isfinite(lower)]
+    return {
+        f"{name}deepest": 1000.0 * float(np.nanmin(lower)) if np.isfinite(lower).any() else None,
+        f"{name}standing_p95": 1000.0 * float(np.percentile(np.abs(standing), 95)) if len(standing) else None,
+        f"{name}standing_max": 1000.0 * float(np.abs(standing).max()) if len(standing) else None,
+    }
+
+
+def _surface(places: np.ndarray, origin: np.ndarray, ground) -> np.ndarray:
+    """Height (T, 2, 2) m of the surface under places (T, 2, 2, 3)."""
+    flat = places.reshape(-1, 3)
+    if ground is not None:
+        return np.asarray(ground.heights(flat[:, :2], flat[:, 2] + 0.5)[0]).reshape(places.shape[:-1])
+    if np.ptp(origin[:, 2]) < 1e-6:
+        return np.full(places.shape[:-1], origin[0, 2])
+    return origin[_nearest_in_time(places, origin), 2]
+
+
+def _nearest_in_time(places: np.ndarray, origin: np.ndarray, reach: int = 90) -> np.ndarray:
+    """Index (T, 2, 2) of the nearest place of the way (T, 3), over the ground, within `reach` frames: a path may cross
+    itself at another height."""
+    count = len(origin)
+    best, index = np.full(places.shape[:-1], np.inf), np.zeros(places.shape[:-1], int)
+    for shift in range(-reach, reach + 1):
+        at = np.clip(np.arange(count) + shift, 0, count - 1)
+        far = np.linalg.norm(places[..., :2] - origin[at, None, None, :2], axis=-1)
+        nearer = far < best
+        best, index = np.where(nearer, far, best), np.where(nearer, at[:, None, None], index)
+    return index
+
+
+def knee_jerk(source, ridden, frames: np.ndarray) -> dict:
+    """The knees' third difference, its 99th percentile and largest, over the recording's own in the frames it used."""
+    body = identify(source.motion.skeleton)
+    knees = [body.left.lower_leg, body.right.lower_leg]
+    mine, his = (jerk.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))
+    used = np.unique(frames)
+    his = his[used[used < len(his)]]
+    if not len(mine) or not len(his):
+        return {"p99": None, "max": None}
+    return {"p99": float(np.percentile(mine, 99) / np.percentile(his, 99)), "max": float(mine.max() / his.max())}
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else np.nan
+
+
+def _spread(values: np.ndarray) -> dict[str, float | None]:
+    if not len(values):
+        return dict.fromkeys(("mean", "p95", "max"))
+    return {"mean": float(np.mean(values)), "p95": float(np.percentile(values, 95)), "max": float(np.max(values))}

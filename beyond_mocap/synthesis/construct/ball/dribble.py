@@ -1,0 +1,126 @@
+"""Dribbling: the ball is touched step by step in front of the striding feet, and rolls ahead and slows in between.
+
+What a feed has of a dribble is the ball somewhere near the player, often within him. Here the feet are left as they are
+and the ball is fitted to them: at which strides a foot touches it, from which side, and for how long it pushes it, is
+chosen by dynamic programming so that the ball is in no foot on its way, lies near its samples, and goes where the foot
+sends it. Between two touches it rolls (`roll`); at key moments it is where it was met.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....motion.skeleton import Skeleton
+from .dribble_search import SOONEST, Between, Push, Search
+from .legs import Legs
+from .meeting import lead
+
+KEY_SECONDS = 0.5
+"""Seconds from either end of a stretch within which a key moment begins or ends the dribble."""
+
+_BEYOND = 0.3  # seconds
+
+
+@dataclass(frozen=True, eq=False)
+class Dribbled:
+    """ball (T, 3) m: its centre; pushes: in the order of time."""
+
+    ball: np.ndarray
+    pushes: tuple[Push, ...]
+
+
+def dribble(
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    standing: np.ndarray,
+    ball: np.ndarray,
+    stretches: Sequence[tuple[float, float]],
+    held: Sequence[tuple[int, int]],
+    fps: float,
+    *,
+    measured: np.ndarray | None = None,
+    turns: Sequence[float] = (),
+) -> Dribbled:
+    """The ball's path with every stretch of dribbling touched step by step.
+
+    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, which stays as it is. standing (T, 2) bool:
+    left and right foot on the ground. ball (T, 3) m: its centre, NaN where there is none. stretches: first and last
+    frame of each, fractional. held: the frames, first and last, in which the ball is met at key moments. measured (T,)
+    bool: False where a sample counts for nothing. turns: frames at which the ball is known to change its course outside
+    of the stretches. Frames before and behind the stretches change only where the ball has to come to its first touch
+    or go from its last.
+    """
+    path, pushes = np.array(ball, dtype=float), []
+    measured = np.isfinite(path).all(axis=1) if measured is None else np.asarray(measured, bool)
+    for low, high in stretches:
+        for part in _parts(low, high, held, len(path), fps):
+            if not np.isfinite(path[part.low : part.high + 1]).all():
+                continue
+            search = Search(skeleton, root, rotations, standing, path, measured, part, fps)
+            found = search.run()
+            if found is None:
+                continue
+            before, after, made = found
+            path[part.low + before : part.low + after + 1] = made
+            pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
+            touched = [*held, *((push.first, push.last) for push in pushes)]
+            others = [*turns, *(edge for pair in touched for edge in pair)]
+            path = _joined(path, ball, part, before, after, others, fps)
+            path = _kept_out(skeleton, root, rotations, path, part, touched, fps)
+    return Dribbled(path, tuple(sorted(pushes, key=lambda push: push.first)))
+
+
+def _parts(low: float, high: float, held, count: int, fps: float) -> list[Between]:
+    """The parts of a stretch, cut where the ball is met; key moments close to its ends are its ends."""
+    reach = KEY_SECONDS * fps
+    inside = sorted(pair for pair in held if low - reach <= pair[1] and pair[0] <= high + reach)
+    low, high = max(int(np.ceil(low)), 0), min(int(np.floor(high)), count - 1)
+    edges = [(None, low), *((pair, None) for pair in inside), (None, high)]
+    out = []
+    for (before, open_low), (after, open_high) in zip(edges, edges[1:]):
+        first = open_low if before is None else before[1]
+        last = open_high if after is None else after[0]
+        if last - first >= SOONEST * fps:
+            out.append(Between(first, last, before is not None, after is not None))
+    return out
+
+
+def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[int], fps: float) -> np.ndarray:
+    """The path led to the first touch and away from the last where nothing is met at the part's ends; first and last
+    are counted from its beginning."""
+    first, last = part.low + first, part.low + last
+    if not part.starts:
+        anchor = max((frame for frame in others if frame < first), default=first - int(fps))
+        path = _led_to(path, first, int(anchor), feed)
+    if not part.ends:
+        anchor = min((frame for frame in others if frame > last), default=last + int(fps))
+        path = _led_to(path, last, int(anchor), feed)
+    return path
+
+
+def _kept_out(
+    skeleton: Skeleton, root, rotations, path: np.ndarray, part: Between, held: Sequence[tuple[int, int]], fps: float
+) -> np.ndarray:
+    """The path led around the body on its way; where the ball is `held` it stays. A little further than the part at
+    open ends, so that it does not jump there."""
+    beyond = int(_BEYOND * fps)
+    low = part.low if part.starts else max(part.low - beyond, 0)
+    high = part.high if part.ends else min(part.high + beyond, len(path) - 1)
+    span, free = slice(low, high + 1), np.ones(len(path), bool)
+    free[[low, high]] = False
+    for first, last in held:
+        free[max(first, 0) : last + 1] = False
+    out = path.copy()
+    out[span] = Legs(skeleton, root[span], rotations[span], fps).kept_out(path[span], free[span])
+    return out
+
+
+def _led_to(path: np.ndarray, frame: int, anchor: int, feed: np.ndarray) -> np.ndarray:
+    """The path as it is led from or to a touch at `frame`; the touch stays where it is."""
+    out = lead(path, frame, anchor, path[frame] - feed[frame])
+    out[frame] = path[frame]
+    return out

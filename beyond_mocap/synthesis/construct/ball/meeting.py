@@ -1,0 +1,212 @@
+"""Where ball and body meet: where the ball goes within its noise, how far the body still is from it, and the ball's
+path."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....base.easing import quintic_step_by_powers
+from ....base.vectors import unit_vectors
+from ....motion.quaternion import turned_about_up
+from ....annotation.striking import ball_gap, nearest_on
+from ....motion.track import BALL_RADIUS
+
+BALL_SECONDS = 0.3
+"""Seconds before and after a key moment over which the ball's shift grows and fades."""
+
+_SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
+_ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, tried
+_ALONG = (0.5, 0.2, 0.8)
+_ANGLE_COST = 0.08  # metres of moved foot that a radian off the part's own direction is worth,
+_ALONG_COST = 0.1  # that the other end of the foot is,
+_INSIDE_COST = 15.0  # a metre of ball within the other leg,
+_MISS_COST = 3.0  # and a metre that the part cannot be moved
+_GRAVITY = 9.81  # m/s^2
+_ON_GROUND = 0.02  # metres above its radius
+
+Line = tuple[np.ndarray, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Room:
+    """How far the ball may be moved: in all, and of that up or down, m."""
+
+    whole: float
+    upright: float
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """Where a part strikes. direction (3,) level, unit: from part to ball. along: share of the way from the start of
+    the part's line (the ankle) to its end (the toes)."""
+
+    direction: np.ndarray
+    along: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """ball (N, 3) m: its centre, moved. need (N, 3) m: what the part has to move to touch it."""
+
+    ball: np.ndarray
+    need: np.ndarray
+
+
+def best_aim(
+    line: Line,
+    radius: float,
+    direction: np.ndarray,
+    rise: float,
+    ball: np.ndarray,
+    room: Room,
+    avoid: Sequence[tuple[Line, float]],
+    possible: Callable[[np.ndarray], np.ndarray],
+) -> Aim:
+    """The aim that asks least of the body, of those within 60 degrees of `direction`: inside, instep, outside.
+
+    line: ends (3,) m of the part's line, radius its own, m; direction (3,) level, unit: where the part strikes; rise:
+    sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
+    lie in; possible: of a move (3,) m of the part, what the body can make of it.
+    """
+    shares = _ALONG[: 1 if rise else None]
+    aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
+    found = meetings(line, radius, aims, rise, ball, room, avoid)
+    least = np.linalg.norm(found.need, axis=1)
+    least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
+    least += _ALONG_COST * np.abs([aim.along - 0.5 for aim in aims])
+    for other, own in avoid:
+        least += _INSIDE_COST * np.maximum(-ball_gap(other, own, found.ball), 0.0)
+    best, cost = aims[0], np.inf
+    for number in np.argsort(least, kind="stable"):
+        if least[number] >= cost:
+            break
+        need = found.need[number]
+        whole = least[number] + _MISS_COST * float(np.linalg.norm(need - possible(need)))
+        best, cost = (aims[number], whole) if whole < cost else (best, cost)
+    return best
+
+
+def meetings(
+    line: Line,
+    radius: float,
+    aims: Sequence[Aim],
+    rise: float,
+    ball: np.ndarray,
+    room: Room,
+    avoid: Sequence[tuple[Line, float]] = (),
+) -> Meeting:
+    """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid,
+    the part the rest."""
+    along = np.array([aim.along for aim in aims])[:, None]
+    start = line[0] + along * (line[1] - line[0])
+    above = rise * (radius + BALL_RADIUS)
+    height = np.clip(start[:, 2] + above, ball[2] - room.upright, ball[2] + room.upright)
+    height = np.maximum(height, BALL_RADIUS)
+    lift = height - start[:, 2] - above
+    lift = np.stack([0.0 * lift, 0.0 * lift, lift - np.clip(lift, -_SLACK, _SLACK)], axis=1)
+    raised = tuple((end + lift)[:, None] for end in line)
+    start[:, 2] = height
+    touching = touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
+    level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
+    away = touching[:, :2] - ball[:2]
+    places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
+    for other, own in avoid:
+        out = (places - nearest_on(other, places))[:, :2]
+        out = unit_vectors(out)
+        places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
+        places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
+    return Meeting(places, places - touching + lift)
+
+
+def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Ways (N, 2) m no longer than `most` (N,) m."""
+    return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
+
+
+def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """The centres (N, 3) of balls that touch surfaces with lines (N, 1, 3), on the rays from `start` (N, 3), which is
+    inside, along `direction` (N, 3); searched on ever finer grids, to some micrometres within a metre."""
+    near, step = np.zeros(len(start)), 1.0
+    for _ in range(3):
+        ways = near[:, None] + step * np.linspace(0.0, 1.0, 65)
+        outside = ball_gap(line, radius, start[:, None] + ways[..., None] * direction[:, None]) >= 0.0
+        first = np.maximum(np.argmax(outside, axis=1) - 1, 0)
+        near, step = near + first * step / 64, step / 64
+    return start + (near + step)[:, None] * direction
+
+
+def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
+    """A ball between both hands: its place (3,) m, and what each hand has to move (2, 3) m to touch it."""
+    places = np.array([0.5 * (start + end) for start, end in hands])
+    middle = places.mean(axis=0)
+    height = max(np.clip(middle[2], ball[2] - room.upright, ball[2] + room.upright), BALL_RADIUS)
+    level = np.sqrt(max(room.whole**2 - (height - ball[2]) ** 2, 0.0))
+    away = middle[:2] - ball[:2]
+    place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
+    out = places - middle
+    out = unit_vectors(out)
+    return place, place + (radius + BALL_RADIUS) * out - places
+
+
+def lofted(ball: np.ndarray, frame: float, height: float, free: np.ndarray, fps: float) -> np.ndarray:
+    """The ball's path (T, 3) m with an arc of free flight through `height` m at `frame` where `free` (T,) says that its
+    height is not known."""
+    seconds = (np.arange(len(ball)) - frame) / fps
+    arc = height - 0.5 * _GRAVITY * seconds**2
+    out = ball.copy()
+    out[:, 2] = np.where(free & (arc > ball[:, 2]), arc, ball[:, 2])
+    return out
+
+
+def shifted(
+    ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int], fps: float
+) -> np.ndarray:
+    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, and eased back to where it was.
+
+    bounds: frames at which it has to be back, beside BALL_SECONDS. Never below its radius.
+    """
+    reach = BALL_SECONDS * fps
+    low, high = max(held[0] - reach, bounds[0]), min(held[1] + reach, bounds[1])
+    frames = np.arange(max(int(np.ceil(low)), 0), min(int(high), len(ball) - 1) + 1)
+    share = eased((frames - low) / max(held[0] - low, 1e-9), (high - frames) / max(high - held[1], 1e-9))
+    ends = places - ball[list(held)]
+    out = ball.copy()
+    out[frames] += share[:, None] * np.where(frames[:, None] <= held[0], ends[0], ends[1])
+    out[frames, 2] = np.maximum(out[frames, 2], BALL_RADIUS)
+    return out
+
+
+def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tuple[int, int]) -> np.ndarray:
+    """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, from and to the frames `bounds`
+    at which it changes its course anyway: in between its velocity changes by the same at every frame, so that what
+    flies or rolls goes on doing so."""
+    shifts = places - ball[list(held)]
+    out = lead(lead(ball, held[0], bounds[0], shifts[0]), held[1], bounds[1], shifts[1])
+    out[list(held)] = places
+    return out
+
+
+def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
+    """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less
+    in between. Its height is what it was as soon as it comes to the ground."""
+    between = np.arange(frame, anchor, 1 if anchor > frame else -1)
+    between = between[(between >= 0) & (between < len(ball))]
+    out = ball.copy()
+    if not len(between):
+        return out
+    away = np.abs(between - frame)
+    out[between, :2] += (1.0 - away / abs(anchor - frame))[:, None] * shift[:2]
+    low = np.flatnonzero(ball[between, 2] <= BALL_RADIUS + _ON_GROUND)
+    lands = min(float(away[low[0]]) if len(low) else np.inf, float(abs(anchor - frame)))
+    fades = np.maximum(1.0 - away / lands, 0.0) if lands else (away == 0).astype(float)
+    out[between, 2] = np.maximum(out[between, 2] + fades * shift[2], BALL_RADIUS)
+    return out
+
+
+def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
+    """0 .. 1 .. 0, twice continuously differentiable: rising and falling (N,) are the straight ramps, 1 and more
+    inside."""
+    return quintic_step_by_powers(np.minimum(rising, falling))

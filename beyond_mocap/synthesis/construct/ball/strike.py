@@ -1,0 +1,434 @@
+"""The ball met: at each key moment the striking part of the body is on the ball's surface, and eases there and back.
+
+The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
+recorded foot (head, chest, hand) strikes; what is left the limb does by two-bone inverse kinematics, or the spine by
+bending, as far as a body reaches; what is left then is told. A kick lasts a hundredth of a second, so between the two
+frames around the key moment the ball goes along with the foot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....base.vectors import unit_vector
+from ....annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
+from ....annotation.labels import list_labels
+from ....motion.humanoid import Limb, heading_from_positions, identify
+from ....motion.motion import pose_kinematics
+from ....motion.skeleton import Skeleton
+from ....annotation.striking import Surface, ball_gap, part_surfaces
+from ....motion.track import BALL_RADIUS
+from ..above_ground import above_ground
+from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
+from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
+
+BALL_NOISE, FILLED_NOISE = 0.3, 1.0
+"""Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
+
+MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}
+"""Metres that a part may be moved from where the recording has it."""
+
+PELVIS_RANGE = (0.20, 0.64)
+"""Metres on the ground from pelvis to striking foot in measured kicks; further out or in only where the recording
+is."""
+
+OUT_OF_REACH = 0.15
+"""Metres of gap that would be left, above which the body does not try, and plays as recorded."""
+
+MOST_DROP = 0.04  # m
+_LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body goes over
+_RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
+_IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
+_HANDS_APART = 0.6  # metres between the wrists, beyond which a dive's catch is one hand's
+_STOPPING = frozenset(list_labels(ball="takes"))
+_HIGH = frozenset(list_labels(height="high"))
+_ROUNDS, _CLOSE = 4, 5e-4
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A key moment in which the ball is met.
+
+    frame: output frame, fractional. words: of the clip that plays there, sides after mirroring. entry, leave: frames
+    before and after `frame` within which the body may be changed.
+    """
+
+    frame: float
+    words: tuple[str, ...]
+    entry: float
+    leave: float
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """What came of it. root (T, 3) m, rotations (T, J, 4) local, ball (T, 3) m.
+
+    Per touch, in the order given, NaN where the words touch no ball or there is none: gap (K,) m between the surfaces
+    at the nearest frame; ball_shift (K,) m on the ground that the ball was moved there; moved (K,) m that the part was.
+    """
+
+    root: np.ndarray
+    rotations: np.ndarray
+    ball: np.ndarray
+    gap: np.ndarray
+    ball_shift: np.ndarray
+    moved: np.ndarray
+
+
+def strike(
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    contacts: np.ndarray,
+    ball: np.ndarray,
+    touches: Sequence[Touch],
+    fps: float,
+    *,
+    measured: np.ndarray | None = None,
+    height_known: np.ndarray | None = None,
+) -> Struck:
+    """The motion and the ball's path with every touch met, as far as a body can.
+
+    root (T, 3) m and rotations (T, J, 4) local: the motion on the pitch, feet planted. contacts (T, 2) bool: left and
+    right foot on the ground; a striking foot is changed only between its lift-off and its landing. ball (T, 3) m: its
+    centre, NaN where there is none. measured (T,) bool: False where the feed filled the ball in; None: measured
+    everywhere. height_known (T,) bool: where the ball's height is measured, None: everywhere; elsewhere the ball lies
+    on the ground but for high touches, to which it rises and from which it falls freely. Frames outside the touches'
+    windows come back bit for bit.
+    """
+    count = len(root)
+    everywhere = np.ones(count, bool)
+    measured = everywhere if measured is None else np.asarray(measured, bool)
+    height_known = everywhere if height_known is None else np.asarray(height_known, bool)
+    root, rotations, feed = (np.array(values, dtype=float) for values in (root, rotations, ball))
+    path, moved = feed.copy(), np.full(len(touches), np.nan)
+    touches = [_when_met(skeleton, root, rotations, feed, touch, fps) for touch in touches]
+    for number, moment in _moments(skeleton, touches, count, fps):
+        if not np.isfinite(feed[list(moment.held)]).all():
+            continue
+        span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
+        body = Body.posed(skeleton, root[span], rotations[span])
+        scene = _scene(body, moment, span.start, contacts[span], path, measured, height_known, fps)
+        struck, moved[number] = _reached(scene, body)
+        root[span], rotations[span] = struck.root, struck.rotations
+        places = [scene.ball_and_needs(scene.lines(struck, frame), frame)[0] for frame in moment.held]
+        path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
+    gap, shift = _told(skeleton, root, rotations, feed, path, touches)
+    return Struck(root, rotations, path, gap, shift, moved)
+
+
+def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
+    """The touch at the frame at which a hand passes the ball nearest, where words allow for that and the ball is out of
+    reach at the key moment itself."""
+    first, last = _nearest(touch.frame, len(root)), _nearest(touch.frame + met_within(touch.words) * fps, len(root))
+    if first == last or not np.isfinite(feed[first : last + 1]).all():
+        return touch
+    places, world = pose_kinematics(skeleton, root[first : last + 1], rotations[first : last + 1])
+    gaps = contact_gap(skeleton, places, world, touch.words, feed[first : last + 1])
+    later = int(np.argmin(gaps))
+    if not later or gaps[0] < BALL_NOISE:
+        return touch
+    return replace(touch, frame=float(first + later), entry=touch.entry + later, leave=touch.leave - later)
+
+
+@dataclass(frozen=True)
+class _Moment:
+    """A touch in frames: the nearest one; the two around it, in which it is held; low and high, at which the body is as
+    it was; bounds, the held frames of the touches before and after."""
+
+    words: frozenset[str]
+    frame: int
+    held: tuple[int, int]
+    low: int
+    high: int
+    bounds: tuple[int, int]
+
+
+def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: float):
+    """(number, moment) of every touch that some part can serve, in the order of time."""
+    shortest, longest = _SHORTEST_EASE * fps, _LONGEST_EASE * fps
+    order = sorted((t.frame, k) for k, t in enumerate(touches) if surfaces(skeleton, t.words))
+    held = [held_frames(frame, count) for frame, _ in order]
+    ends = [(-count, -count), *held, (2 * count, 2 * count)]
+    for place, (frame, number) in enumerate(order):
+        touch, (first, last) = touches[number], held[place]
+        before, after = ends[place][1], ends[place + 2][0]
+        low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
+        high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
+        yield number, _Moment(frozenset(touch.words), _nearest(frame, count), held[place], low, high, (before, after))
+
+
+def _nearest(frame: float, count: int) -> int:
+    return int(np.clip(np.rint(frame), 0, count - 1))
+
+
+def held_frames(frame: float, count: int) -> tuple[int, int]:
+    """The frames, of `count`, before and after a fractional one, in which a touch is held; twice the same where it is
+    nearly whole."""
+    near = _nearest(frame, count)
+    if abs(frame - near) < 0.02:
+        return near, near
+    return int(np.clip(np.floor(frame), 0, count - 1)), int(np.clip(np.ceil(frame), 0, count - 1))
+
+
+@dataclass(frozen=True, eq=False)
+class _Scene:
+    """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
+    and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the
+    first of the body's W frames."""
+
+    moment: _Moment
+    parts: tuple[Surface, ...]
+    shares: tuple[np.ndarray, ...]
+    ball: np.ndarray
+    measured: np.ndarray
+    aim: Aim
+    avoid: list[tuple]
+    origin: int
+
+    @property
+    def at(self) -> int:
+        """The moment among the body's frames."""
+        return self.moment.frame - self.origin
+
+    def lines(self, body: Body, frame: int) -> np.ndarray:
+        """(P, 2, 3) m: both ends of every part's line."""
+        return np.array([body.line(part, frame - self.origin) for part in self.parts])
+
+    def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Where the ball goes (3,) m at a frame, and what each part with lines (P, 2, 3) m then lacks (P, 3) m to touch
+        it."""
+        part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
+        if len(lines) == 2:
+            return held_meeting(lines, part.radius, ball, room)
+        met = meetings(lines[0], part.radius, [self.aim], _RISE[part.part], ball, room, self.avoid)
+        return met.ball[0], met.need
+
+    def room(self, frame: int) -> Room:
+        """How far the ball may move; one on the ground stays there."""
+        whole = BALL_NOISE if self.measured[frame] else FILLED_NOISE
+        return Room(whole, BALL_NOISE if self.ball[frame, 2] > _IN_THE_AIR else 0.0)
+
+
+def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, height_known, fps: float) -> _Scene:
+    at = moment.frame - origin
+    choices = surfaces(body.skeleton, moment.words)
+    if choices[0].part == "hand" and _together(body, choices, at, moment.words):
+        parts = choices
+    else:
+        parts = (_likeliest(body, choices, at, contacts, path[moment.frame], fps),)
+    shares = tuple(_share(moment, origin, len(body.root), _standing(contacts, part), fps) for part in parts)
+    line, radius = body.line(parts[0], at), parts[0].radius
+    if parts[0].part != "foot" or _HIGH & moment.words:
+        height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
+        path = lofted(path, moment.frame, float(height), ~height_known, fps)
+    ahead = _direction(body, parts[0], moment, at, path, fps)
+    avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
+    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), avoid, origin)
+    if len(parts) == 2:
+        return scene
+    def possible(need: np.ndarray) -> np.ndarray:
+        return _bounded(body, parts[0], at, need)
+
+    rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
+    return replace(scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, possible))
+
+
+def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
+    """Line and radius of the foot and the shin that do not strike."""
+    other = next(part for part in part_surfaces(body.skeleton, "foot") if part.side != foot.side)
+    knee, ankle = body.places[at, list(_chain(body, other)[1:])]
+    return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
+
+
+def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
+    """Whether all hands that are named go to the ball: in a dive only to catch it, and where they are not far apart."""
+    middles = [np.mean(body.line(hand, at), axis=0) for hand in hands]
+    near = np.linalg.norm(middles[0] - middles[-1]) < _HANDS_APART
+    return not met_within(words) or bool(near and by_both_hands(words))
+
+
+def _likeliest(body: Body, choices: Sequence[Surface], at: int, contacts, ball: np.ndarray, fps: float) -> Surface:
+    """The part nearest to the ball, a swinging foot before one that stands."""
+    def cost(part: Surface) -> float:
+        gap = float(ball_gap(body.line(part, at), part.radius, ball))
+        return gap + 0.3 * _standing(contacts, part)[at] - 0.05 * np.linalg.norm(_velocity(body, part, at, fps))
+
+    return min(choices, key=cost)
+
+
+def _standing(contacts: np.ndarray, part: Surface) -> np.ndarray:
+    """(W,) bool: the part is a foot on the ground."""
+    if part.part != "foot":
+        return np.zeros(len(contacts), bool)
+    return contacts[:, ("left", "right").index(part.side)]
+
+
+def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
+    """(W,) how much of its shift a part has at each frame: 1 while the touch is held, 0 outside the clip's entry and
+    exit and while the foot stands, but for the least time that a body needs."""
+    first, last = (frame - origin for frame in moment.held)
+    before = np.flatnonzero(standing[:first] & ~np.logical_and.accumulate(standing[:first][::-1])[::-1])
+    after = np.flatnonzero(standing[last + 1 :] & ~np.logical_and.accumulate(standing[last + 1 :]))
+    lift, land = before[-1] if len(before) else -np.inf, last + 1 + after[0] if len(after) else np.inf
+    least = _SHORTEST_EASE * fps
+    low = max(moment.low - origin, min(lift, first - least))
+    high = min(moment.high - origin, max(land, last + least))
+    frames = np.arange(count)
+    return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))
+
+
+def _velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
+    """(3,) m/s of the part's middle."""
+    around = slice(max(at - 1, 0), at + 2)
+    middle = np.mean(body.line(part, around), axis=0)
+    return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
+
+
+def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.ndarray, fps: float) -> np.ndarray:
+    """(3,) level, unit: a kick drives the ball where the foot goes, and rather where it is seen to fly; who stops a
+    ball has it on the side from which it comes; head, chest and hands have it ahead."""
+    angle = heading_from_positions(body.skeleton, body.places[at])
+    ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
+    reach = max(int(round(0.1 * fps)), 1)
+    coming = _flat(path[moment.frame] - path[max(moment.frame - reach, 0)]) / 0.1
+    leaving = _flat(path[min(moment.frame + reach, len(path) - 1)] - path[moment.frame]) / 0.1
+    if part.part == "hand" and met_within(moment.words):
+        return unit_vector(-coming, ahead)
+    if part.part != "foot":
+        return ahead
+    if _STOPPING & moment.words:
+        middle = np.mean(body.line(part, at), axis=0)
+        wish = -coming if np.linalg.norm(coming) > 1.0 else _flat(path[moment.frame] - middle)
+        return unit_vector(unit_vector(wish, ahead) + 0.8 * ahead, ahead)
+    swing = _flat(_velocity(body, part, at, fps))
+    along = unit_vector(swing, ahead) if np.linalg.norm(swing) > 1.0 else ahead
+    return unit_vector(along + 0.5 * unit_vector(leaving, along), along) if np.linalg.norm(leaving) > 3.0 else along
+
+
+def _flat(v: np.ndarray) -> np.ndarray:
+    return v * [1.0, 1.0, 0.0]
+
+
+def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
+    """The body with its parts at the ball, as far as they reach, and how far they were moved, m.
+
+    What is asked for and what the body makes of it are worked out in turns, since a nearly straight limb gives way
+    softly and a spine bends on an arc.
+    """
+    own = scene.lines(body, scene.moment.frame)
+    if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:
+        return body, 0.0
+    limbs, shifts, struck, lines = _carriers(body, scene.parts), np.zeros((len(scene.parts), 3)), body, own
+    for _ in range(_ROUNDS):
+        wished = _wished(scene, body, lines, shifts)
+        if np.linalg.norm(wished - shifts) < _CLOSE:
+            break
+        struck, shifts = _moved(scene, body, limbs, wished), wished
+        lines = scene.lines(struck, scene.moment.frame)
+    if np.linalg.norm(scene.ball_and_needs(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
+        return body, 0.0
+    moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()
+    return _other_foot_kept(body, struck, scene.parts[0]), float(moved)
+
+
+def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """Shifts (P, 3) m that bring parts to the ball which are at `lines` (P, 2, 3) m by `shifts` (P, 3) m, as far as a
+    body can make them."""
+    wished = shifts
+    for _ in range(_ROUNDS):
+        _, needs = scene.ball_and_needs(lines + (wished - shifts)[:, None], scene.moment.frame)
+        if np.linalg.norm(needs) < _CLOSE:
+            break
+        pairs, before = zip(scene.parts, wished, needs), wished
+        wished = np.array([_bounded(body, part, scene.at, shift + need) for part, shift, need in pairs])
+        if np.linalg.norm(wished - before) < _CLOSE:
+            break
+    return wished
+
+
+def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+    """A shift (3,) m that a body can make: not too far, and a limb neither below the ground nor beyond its joints."""
+    shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
+    if part.part == "foot":
+        shift = above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
+    if part.part in MOST_SWING and None not in _chain(body, part):
+        shift = swung(body, _chain(body, part), _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
+    return shift
+
+
+def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
+    pelvis = body.places[at, identify(body.skeleton).hips]
+    middle = np.mean(body.line(part, at), axis=0)
+    away = _flat(middle + shift - pelvis)
+    own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
+    ranged = np.clip(wanted, min(PELVIS_RANGE[0], own), max(PELVIS_RANGE[1], own))
+    return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
+
+
+def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
+    """The limb's swing with which the part is moved by `shift` (3,) m; the pelvis sinks where its leg is too short."""
+    chain = _chain(body, part)
+    place = body.places[at, chain[2]] + shift
+    lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
+    return swing_to(body, chain, at, place, MOST_SWING[part.part], lowered)
+
+
+def _chain(body: Body, part: Surface) -> tuple[int, int, int]:
+    return leg(_limb(body, part)) if part.part == "foot" else arm(_limb(body, part))
+
+
+def _limb(body: Body, part: Surface) -> Limb:
+    return getattr(identify(body.skeleton), part.side)
+
+
+def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
+    """Metres, at most MOST_DROP, to lower the pelvis so that the leg reaches the place (3,) of its ankle."""
+    hip, knee, own = body.places[at, list(chain)]
+    upper, lower = np.linalg.norm(knee - hip), np.linalg.norm(own - knee)
+    length = np.sqrt(upper**2 + lower**2 - 2.0 * upper * lower * np.cos(MOST_ANGLE))
+    length, level = max(length, np.linalg.norm(own - hip)), np.linalg.norm(_flat(ankle - hip))
+    return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
+
+
+def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
+    """The limb of every foot or hand."""
+    limbs = [(_limb(body, part), part.part) for part in parts if part.part in ("foot", "hand")]
+    return [Resting.of(body, leg(limb) if part == "foot" else arm(limb)) for limb, part in limbs]
+
+
+def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
+    """The body with each part moved by its shift (3,) m, blended by its share."""
+    part, root, rotations = scene.parts[0], body.root, body.rotations
+    if not limbs:
+        rotations = spine_bent(body, part, scene.at, shifts[0], scene.shares[0])
+    for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
+        swing = _swing(body, part, scene.at, shift)
+        moves = swung(body, limb.chain, swing, share)
+        moves = above_ground(body, part, slice(None), moves) if part.part == "foot" else moves
+        root = root - share[:, None] * [0.0, 0.0, swing.lowered]
+        rotations = limb_carried(body, limb, moves, root, rotations)
+    return Body.posed(body.skeleton, root, rotations)
+
+
+def _other_foot_kept(body: Body, struck: Body, part: Surface) -> Body:
+    """Where the pelvis has sunk, the foot that does not strike stays where it is."""
+    if np.array_equal(struck.root, body.root):
+        return struck
+    human = identify(body.skeleton)
+    limb = Resting.of(body, leg(human.right if part.side == "left" else human.left), soft=1e-3)
+    rotations = limb_carried(body, limb, np.zeros_like(body.root), struck.root, struck.rotations)
+    return Body.posed(body.skeleton, struck.root, rotations)
+
+
+def _told(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
+    """Gap (K,) m and the ball's shift on the ground (K,) m at the frame nearest to each touch."""
+    frames = np.array([_nearest(touch.frame, len(root)) for touch in touches], dtype=int)
+    places, world = pose_kinematics(skeleton, root[frames], rotations[frames])
+    told = zip(places, world, touches, path[frames])
+    gaps = [contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in told]
+    shift = np.linalg.norm((path - feed)[frames, :2], axis=1)
+    return np.abs(np.array(gaps, dtype=float)), np.where(np.isfinite(gaps), shift, np.nan)

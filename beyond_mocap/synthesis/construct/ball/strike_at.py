@@ -1,0 +1,136 @@
+"""A part of the body brought to a ball that stays where it is: the ball's flight is given, the body meets it.
+
+`synthesis.construct.ball.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by the shortest way
+that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by bending the
+spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and its landing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....motion.humanoid import identify
+from ....motion.motion import Motion
+from ....annotation.striking import Surface, ball_gap, nearest_on
+from ..above_ground import above_ground
+from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
+from .meeting import eased
+
+LONGEST, SHORTEST = 0.5, 0.12
+"""Seconds before and after a strike within which the part comes to the ball and goes back, at most and at least."""
+
+MOST = 0.35
+"""Metres that a part is moved at most."""
+
+_ROUNDS, _CLOSE = 6, 2e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """One strike. frame: fractional. surface: what strikes. ball (3,) m: the ball's centre, NaN where it is missed;
+    radius: its radius, m. entry, leave: frames before and after within which the body may be changed."""
+
+    frame: float
+    surface: Surface
+    ball: np.ndarray
+    radius: float
+    entry: float
+    leave: float
+
+
+@dataclass(frozen=True, eq=False)
+class Met:
+    """motion; per strike gap (K,) m between the surfaces and moved (K,) m that the part was, NaN where it is missed."""
+
+    motion: Motion
+    gap: np.ndarray
+    moved: np.ndarray
+
+
+def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], grounded: bool = False) -> Met:
+    """A motion with its parts on the ball at every strike, as far as a body can; standing (T, 2) bool: left and right
+    foot on the ground. grounded: the ground is at height 0, and no foot goes through it. Frames away from the strikes
+    keep their bits."""
+    root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
+    gap, moved = np.full(len(meetings), np.nan), np.full(len(meetings), np.nan)
+    count = len(motion)
+    for number, meeting in enumerate(meetings):
+        if not np.all(np.isfinite(meeting.ball)):
+            continue
+        at = int(np.clip(round(meeting.frame), 0, count - 1))
+        share = _share(meeting, at, count, standing, motion.fps)
+        span = np.flatnonzero(share > 0.0)
+        low, high = span[0], span[-1] + 1
+        body = Body.posed(motion.skeleton, root[low:high], rotations[low:high])
+        struck, moved[number], gap[number] = _reached(body, meeting, at - low, share[low:high], grounded)
+        root[low:high], rotations[low:high] = struck.root, struck.rotations
+    return Met(replace(motion, root_positions=root, rotations=rotations), gap, moved)
+
+
+def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) how much of its shift the part has: 1 at the strike, 0 outside the hit motion and while the foot stands, but
+    for the least time that a body needs."""
+    low = at - np.clip(meeting.entry, SHORTEST * fps, LONGEST * fps)
+    high = at + np.clip(meeting.leave, SHORTEST * fps, LONGEST * fps)
+    if meeting.surface.part == "foot":
+        stands = standing[:, ("left", "right").index(meeting.surface.side)]
+        before, after = np.flatnonzero(stands[:at]), np.flatnonzero(stands[at + 1 :])
+        lift, land = before[-1] if len(before) else -np.inf, at + 1 + after[0] if len(after) else np.inf
+        low, high = max(low, min(lift, at - SHORTEST * fps)), min(high, max(land, at + SHORTEST * fps))
+    frames = np.arange(count)
+    return eased((frames - low) / max(at - low, 1e-9), (high - frames) / max(high - at, 1e-9))
+
+
+def _reached(
+    body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool
+) -> tuple[Body, float, float]:
+    """The body with its part at the ball, how far the part was moved and what gap is left, m."""
+    shift, best = np.zeros(3), (body, 0.0, abs(_gap(body, meeting, at)))
+    struck = body
+    for _ in range(_ROUNDS):
+        line = struck.line(meeting.surface, at)
+        way = meeting.ball - nearest_on(line, meeting.ball)
+        far = np.linalg.norm(way)
+        need = way * (1.0 - (meeting.surface.radius + meeting.radius) / max(far, 1e-9))
+        if np.linalg.norm(need) < _CLOSE:
+            break
+        shift = shift + need
+        shift *= min(1.0, MOST / max(np.linalg.norm(shift), 1e-9))
+        if grounded and meeting.surface.part == "foot":
+            shift = above_ground(body, meeting.surface, at, shift)
+        struck = _carried(body, meeting.surface, at, shift, share, grounded)
+        left = abs(_gap(struck, meeting, at))
+        if left < best[2]:
+            best = struck, float(np.linalg.norm(shift)), left
+    return best
+
+
+def _gap(body: Body, meeting: Meeting, at: int) -> float:
+    return float(ball_gap(body.line(meeting.surface, at), meeting.surface.radius, meeting.ball, meeting.radius))
+
+
+def _carried(
+    body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool
+) -> Body:
+    """The body with the surface moved by `shift` (3,) m at frame `at`, by its share (W,) around it."""
+    human = identify(body.skeleton)
+    root, rotations = body.root, body.rotations
+    if surface.part in ("foot", "hand", "tool"):
+        limb = getattr(human, surface.side)
+        kind, chain = ("foot", leg(limb)) if surface.part == "foot" else ("hand", arm(limb))
+        swing = swing_to(body, chain, at, body.places[at, chain[2]] + shift, MOST_SWING[kind])
+        moves = swung(body, chain, swing, share)
+        if grounded and surface.part == "foot":
+            moves = above_ground(body, surface, slice(None), moves)
+        rotations = limb_carried(body, Resting.of(body, chain), moves)
+    elif surface.part in ("head", "chest"):
+        rotations = spine_bent(body, surface, at, shift, share)
+    else:
+        root = root + share[:, None] * shift
+        for limb in (human.left, human.right):
+            held = Resting.of(body, leg(limb), soft=1e-3)
+            rotations = limb_carried(body, held, np.zeros_like(root), root, rotations)
+    return Body.posed(body.skeleton, root, rotations)

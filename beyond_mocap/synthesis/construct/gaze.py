@@ -1,0 +1,127 @@
+"""Heads that follow the ball: the gaze turned to a place that moves, smoothly and as far as a neck turns.
+
+Where the head should turn is a continuous function of the direction in which the ball lies as the body sees it. Ahead
+it is that direction, within what a neck can do; to the side it stays at its limit; behind the body it goes back to
+looking ahead, and so changes sides without a jump; overhead, where no side is told, it looks up. The way there is then
+smoothed over time. Neck and chest take a share of each turn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...base.easing import smoothstep
+from ...base.vectors import unit_vectors
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from ...motion.humanoid import heading_from_positions, identify
+from ...motion.motion import Motion, forward_kinematics
+from ...motion.track import zero_phase_hann
+
+MOST_YAW, MOST_UP, MOST_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)
+"""How far from straight ahead of the body a gaze that follows a ball turns at most."""
+
+CHEST, NECK = 0.12, 0.35
+"""Shares of a turn that chest and neck take; the head takes the rest."""
+
+SECONDS = 0.4
+"""Window over which the head's turning is smoothed."""
+
+_OVERHEAD = 0.5  # length on the ground of a unit direction below which its side counts less and less
+_BEHIND = 0.5  # cosine from straight behind beyond which the head begins to turn back
+
+
+def following(
+    motion: Motion,
+    places: np.ndarray,
+    look: np.ndarray,
+    share: np.ndarray | float = 1.0,
+    chest: np.ndarray | float = CHEST,
+) -> Motion:
+    """The motion with its head turned to follow `places` (T, 3) m, NaN where there is nothing to look at.
+
+    look (3,): which way the head joint looks, in its own frame (`pins.look_axis`). share (T,): how much of the turn is
+    made at each frame; chest (T,): how much of it the chest takes. The motion itself where nothing is to be seen
+    throughout.
+    """
+    known = np.isfinite(places).all(axis=1)
+    if not known.any():
+        return motion
+    body = identify(motion.skeleton)
+    joints, world = forward_kinematics(motion)
+    head = body.head_or_neck
+    facing = heading_from_positions(motion.skeleton, joints)
+    away = _held(places, known) - joints[:, head]
+    seen = quaternion.rotate(quaternion.about_up(-facing), away)
+    yaw, pitch = _smoothed(seen, motion.fps).T
+    wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
+    wanted = quaternion.rotate(quaternion.about_up(facing), wanted)
+    sight = quaternion.rotate(world[:, head], np.broadcast_to(look, wanted.shape))
+    turn = quaternion.to_rotation_vector(quaternion.between(sight, wanted))
+    eased = np.broadcast_to(share, len(known)) * _eased_in(known, motion.fps)
+    return _turned(motion, world, head, eased[:, None] * turn, np.broadcast_to(chest, len(known)))
+
+
+def head_angles(seen: np.ndarray) -> np.ndarray:
+    """(N, 2) radians of yaw (to the left) and pitch (up) by which a head turns to look where `seen` (N, 3) lies from
+    it, x ahead of the body and y to its left; continuous but straight up and down."""
+    unit = unit_vectors(seen)
+    level = np.hypot(unit[:, 0], unit[:, 1])
+    back = np.maximum(-unit[:, 0] - _BEHIND * level, 0.0) / (1.0 - _BEHIND)
+    side = arctan2(unit[:, 1], np.maximum(unit[:, 0], back))
+    yaw = _limited(side, MOST_YAW) * smoothstep(level / _OVERHEAD)
+    pitch = arctan2(unit[:, 2], level)
+    return np.column_stack([yaw, np.where(pitch > 0.0, _limited(pitch, MOST_UP), _limited(pitch, MOST_DOWN))])
+
+
+def _limited(angle: np.ndarray, most: float) -> np.ndarray:
+    """Angles (N,) that near `most` softly: up to three quarters of it they are as they were."""
+    free = 0.75 * most
+    over = np.maximum(np.abs(angle) - free, 0.0)
+    return np.sign(angle) * (np.minimum(np.abs(angle), free) + (most - free) * np.tanh(over / (most - free)))
+
+
+def _smoothed(seen: np.ndarray, fps: float) -> np.ndarray:
+    """(T, 2) `head_angles` over time, without jerks."""
+    return zero_phase_hann(head_angles(seen), fps, SECONDS)
+
+
+def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(T, 3) with the nearest known place before (or behind the first) where none is known."""
+    at = np.flatnonzero(known)
+    return places[at[np.clip(np.searchsorted(at, np.arange(len(known)), side="right") - 1, 0, None)]]
+
+
+def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) 1 where there is something to see, fading within SECONDS beside what is not known."""
+    if known.all():
+        return np.ones(len(known))
+    frames, without = np.arange(len(known)), np.flatnonzero(~known)
+    after = np.searchsorted(without, frames)
+    beside = (without[np.clip(after - back, 0, len(without) - 1)] for back in (0, 1))
+    return smoothstep(np.minimum(*(np.abs(frames - other) for other in beside)) / (SECONDS * fps))
+
+
+def _turned(motion: Motion, world: np.ndarray, head: int, turn: np.ndarray, chest: np.ndarray) -> Motion:
+    """The head turned by rotation vectors (T, 3) in the world, neck and chest (T,) by their shares of them."""
+    body, parents = identify(motion.skeleton), motion.skeleton.parents
+    shares, taken = {}, np.zeros(len(turn))
+    for joint, own in ((body.chest, chest), (body.neck, NECK)):
+        if joint is not None and joint not in (head, body.hips):
+            taken = taken + own
+            shares[joint] = taken
+    shares[head] = np.ones(len(turn))
+    rotations, moved = np.array(motion.rotations), turn.any(axis=1)
+    for joint, part in shares.items():
+        above = parents[joint]
+        while above >= 0 and above not in shares:
+            above = parents[above]
+        carried = shares[above] if above >= 0 else np.zeros(len(turn))
+        below = world[:, parents[joint]] if joint else np.broadcast_to(quaternion.IDENTITY, (len(turn), 4))
+        below = quaternion.multiply(quaternion.from_rotation_vector(carried[:, None] * turn), below)
+        own = quaternion.multiply(quaternion.from_rotation_vector(part[:, None] * turn), world[:, joint])
+        local = quaternion.signed_like(quaternion.multiply(quaternion.inverse(below), own), rotations[:, joint])
+        rotations[:, joint] = np.where(moved[:, None], local, rotations[:, joint])
+    return replace(motion, rotations=rotations)

@@ -1,0 +1,449 @@
+"""Small extra steps: a foot that would be dragged along while it stands is lifted and set down anew instead.
+
+No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball.
+Laid on such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further
+after a body on rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for
+some tenths of a second while the other one stands, and `foot_plant` sets it down where the body will be in the
+middle of the stance that follows. Left and right take turns, since each step resets what its foot lags behind. Where
+nothing drags nothing is done. Where the other foot is in the air for too long to step, and only gently so, its own
+lift is left out: it stays down, and steps when it is due.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.easing import smoothstep
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from ...motion.humanoid import Limb, identify
+from ...motion.motion import pose_kinematics
+from ...base.runs import runs
+from ...motion.skeleton import Skeleton
+from ...motion.track import zero_phase_hann
+from ...motion.reach import two_bone
+
+SPEED = np.array([0.05, 0.3, 0.8, 1.5])
+STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
+TURN = np.array([0.28, 0.35, 0.45, 0.60])
+SWING = np.array([0.45, 0.38, 0.32, 0.30])
+"""By the body's speed in m/s: metres that a foot is dragged, and radians that it is turned, from the beginning of a
+stance to its end before a step is taken, and the step's seconds. At 0.3 m/s that makes 1.5 steps a second."""
+
+SPARED = 1.15
+"""Times STRIDE and TURN that a stance is let drag before it is broken."""
+
+LEAST_SWING = 0.26
+"""Seconds of the quickest step, where there is no time for more."""
+
+HEEL_OFF, TOE_ON = 0.06, 0.03
+"""Seconds of a step in which the heel leaves the ground before the toe, and in which the toe is down again."""
+
+LATE = 1.3
+"""Times STRIDE and TURN that a foot may lag before a lift of the other one is left out so that it can step sooner."""
+
+CLEARLY = 0.3
+"""By how much one of two feet has to lag more to go first."""
+
+SETTLED = 0.04
+"""Seconds that a foot stands at least before the other one is lifted, and after it is down again."""
+
+SHORTEST = 0.2
+"""Seconds that are left of a stance at least on either side of a step."""
+
+APART = 0.11
+"""Metres between the ankles that feet on their way past each other keep."""
+
+LIFT = 0.045
+"""Metres that a foot is lifted."""
+
+HEEL_UP, TOE_UP = 0.22, 0.06
+"""Radians: heel over toe after lifting, toe over heel before landing."""
+
+SWAY = 0.012
+"""Metres that the pelvis goes over to the foot that stands."""
+
+GENTLE_SPEED, GENTLE_HEIGHT, GENTLE_SECONDS = 0.6, 0.20, 1.5
+"""m/s of the body up to which a lift may be left out, metres that the ankle rises in it, and its seconds."""
+
+UPRIGHT = 0.75
+"""Of the usual height of the root: who is lower crouches, kneels or lies, and takes no steps."""
+
+_LEFT, _RIGHT, _ROUNDS = 0, 1, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """What plants and labels feet. rotations (T, J, 4) local, with lifts left out; standing (T, 2, 2) bool: heels
+    and toes that stand now; contacts (T, 2) bool: feet that stand flat, as they did in the source; stepped (T, 2)
+    bool: feet in an extra step, from heel to heel; moves (T, 2, 4): metres by which each foot is moved, and radians
+    that its heel is up about its toe; sway (T, 2) m of the pelvis."""
+
+    rotations: np.ndarray
+    standing: np.ndarray
+    contacts: np.ndarray
+    stepped: np.ndarray
+    moves: np.ndarray
+    sway: np.ndarray
+
+    @staticmethod
+    def none(rotations: np.ndarray, standing: np.ndarray) -> Steps:
+        """No steps at all; rotations (T, J, 4), standing (T, 2, 2) bool."""
+        count = len(standing)
+        nothing = np.zeros((count, 2))
+        return Steps(
+            rotations, standing, standing.all(axis=2), nothing.astype(bool), np.zeros((count, 2, 4)), nothing
+        )
+
+
+def steps(
+    skeleton: Skeleton,
+    root: np.ndarray,
+    rotations: np.ndarray,
+    standing: np.ndarray,
+    fps: float,
+    given: np.ndarray | None = None,
+    free: np.ndarray | None = None,
+) -> Steps:
+    """The extra steps of a motion laid out on the ground.
+
+    root (T, 3) m and rotations (T, J, 4) local; standing (T, 2, 2) bool of heels and toes, left and right. given (T,
+    2) bool: steps that are taken already, `free` (T,) bool: where others may be added (everywhere).
+    """
+    none = Steps.none(rotations, standing)
+    if len(root) < 2:
+        return none
+    body = identify(skeleton)
+    places, world = pose_kinematics(skeleton, root, rotations)
+    heading = np.unwrap(quaternion.yaw(rotations[:, 0]))
+    limbs = (body.left, body.right)
+    feet = [_Foot(limb, places, world, root, heading, standing[:, side]) for side, limb in enumerate(limbs)]
+    upright = root[:, 2] > UPRIGHT * np.median(root[:, 2])
+    speed = np.linalg.norm(np.gradient(zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
+    stepped = none.stepped if given is None else given
+    plan = _Plan(feet, stepped, speed, fps, upright if free is None else free & upright)
+    plan.run()
+    feet = plan.feet
+    for foot in feet:
+        rotations = foot.held_down(skeleton, root, rotations)
+    stands = np.stack([standing[:, side] | foot.held[:, None] for side, foot in enumerate(feet)], axis=1)
+    stepped = stepped | plan.stepped
+    swings = _swings(stepped, fps)
+    moves, sway = _shape(stepped, swings, feet[_LEFT].root, [foot.middle for foot in feet], fps)
+    if stepped.any():
+        hips = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
+        left = hips[:, 0] + 1j * hips[:, 1]
+        moves[..., :2] = _apart(plan, stepped, left / np.maximum(np.abs(left), 1e-9))
+    return Steps(rotations, stands & ~swings[:, :, None], none.contacts & ~stepped, stepped, moves, sway)
+
+
+class _Foot:
+    """One foot where the motion has it, on the ground as complex numbers x + iy.
+
+    points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands
+    and flat (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held`
+    (T,) bool, between which of its places the foot is, and how far.
+    """
+
+    def __init__(self, limb: Limb, places, world, root, heading, standing: np.ndarray):
+        self.limb, self.places, self.world = limb, places[:, limb.foot], world[:, limb.foot]
+        toe = places[:, limb.toe_or_foot]
+        along = toe - self.places if limb.toe is not None else quaternion.rotate(self.world, np.array([1.0, 0.0, 0.0]))
+        self.yaw = np.unwrap(arctan2(along[:, 1], along[:, 0]))
+        self.stands, self.flat = standing.any(axis=1), standing.all(axis=1)
+        self.held = np.zeros(len(root), bool)
+        self.before, self.behind, self.through = np.zeros(len(root), int), np.zeros(len(root), int), np.zeros(len(root))
+        self.heading, self.root = heading, root[:, 0] + 1j * root[:, 1]
+        self.points = np.stack([self.places[:, 0] + 1j * self.places[:, 1], toe[:, 0] + 1j * toe[:, 1]], axis=1)
+        self.middle = self.points.mean(axis=1)
+
+    def with_lift_left_out(self, first: int, end: int, reach: int) -> _Foot:
+        """The foot kept on the ground in frames first .. end too, carried along by the body from where it stood to
+        where it will stand, if it does; `reach`: frames by which that may begin sooner and end later, so that it stands
+        flat there."""
+        new = copy.copy(self)
+        for name in ("held", "before", "behind", "through", "points", "middle", "yaw"):
+            setattr(new, name, getattr(self, name).copy())
+        first, end = self._flat_before(first, reach), self._flat_behind(end, reach)
+        at, before = slice(first, end), first - 1
+        behind = end if end < len(self.yaw) else before
+        through = smoothstep(_through(first, end))
+        new.held[at], new.before[at], new.behind[at], new.through[at] = True, before, behind, through
+        new.points[at] = new._between(self.points, at)
+        new.middle[at] = new.points[at].mean(axis=1)
+        own = self.yaw[[before, behind]] - self.heading[[before, behind]]
+        change = quaternion.wrapped(own[1] - own[0])
+        new.yaw[end:] += own[0] + change - own[1]
+        new.yaw[at] = self.heading[at] + own[0] + through * change
+        return new
+
+    def _between(self, points: np.ndarray, at) -> np.ndarray:
+        """Held places (N, K) at frames `at`: straight from the one to the other as the body sees it."""
+        own = [
+            (points[edge[at]] - self.root[edge[at], None]) * np.exp(-1j * self.heading[edge[at], None])
+            for edge in (self.before, self.behind)
+        ]
+        way = own[0] + self.through[at, None] * (own[1] - own[0])
+        return way * np.exp(1j * self.heading[at, None]) + self.root[at, None]
+
+    def _flat_before(self, first: int, reach: int) -> int:
+        low = max(first - reach, 0)
+        stands = self.stands[low:first] & ~self.held[low:first]
+        low += int(np.flatnonzero(~stands)[-1]) + 1 if not stands.all() else 0
+        flat = np.flatnonzero(self.flat[low:first])
+        return low + int(flat[-1]) + 1 if len(flat) else first
+
+    def _flat_behind(self, end: int, reach: int) -> int:
+        stands = self.stands[end : end + reach] & ~self.held[end : end + reach]
+        high = end + (len(stands) if stands.all() else int(np.argmin(stands)))
+        flat = np.flatnonzero(self.flat[end:high])
+        return end + int(flat[0]) if len(flat) else end
+
+    def held_down(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+        """Local rotations (T, J, 4) with the leg bent so that the foot is down where it is held."""
+        at = np.flatnonzero(self.held)
+        if not len(at):
+            return rotations
+        height = [self.places[edge[at], 2] for edge in (self.before, self.behind)]
+        level = self.points[at, 0]
+        target = np.stack([level.real, level.imag, height[0] + self.through[at] * (height[1] - height[0])], axis=1)
+        turn = [
+            quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge[at]]), self.world[edge[at]])
+            for edge in (self.before, self.behind)
+        ]
+        turned = quaternion.slerp(*turn, self.through[at])
+        chain = (self.limb.upper_leg, self.limb.lower_leg, self.limb.foot)
+        out = rotations.copy()
+        out[at] = two_bone(skeleton, root[at], rotations[at], chain, target, end_rotation=turned).rotations
+        return quaternion.continuous(out)
+
+
+class _Plan:
+    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are what has come
+    of it."""
+
+    def __init__(self, feet: list[_Foot], given: np.ndarray, speed: np.ndarray, fps: float, free: np.ndarray):
+        self.feet, self.speed, self.fps = feet, speed, fps
+        self.stands = np.stack([foot.stands for foot in feet], axis=1) & ~given
+        self.stepped, self.lag = np.zeros_like(self.stands), np.zeros(self.stands.shape)
+        self.free_until = _until(free)
+        self.swing = np.maximum(np.rint(np.interp(speed, SPEED, SWING) * fps).astype(int), 3)
+        self.settled, self.shortest, self.least = (
+            max(1, int(round(seconds * fps))) for seconds in (SETTLED, SHORTEST, LEAST_SWING)
+        )
+        self.turn = np.interp(speed, SPEED, TURN)
+        self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._room())
+        self.last = None
+        self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
+
+    def _room(self) -> np.ndarray:
+        """(T,) m that a stride may be long without one foot coming nearer than APART to the other, to either side of
+        which it is half a stride away as the body drifts."""
+        left, right = (foot.middle for foot in self.feet)
+        way = 0.5 * (left + right)
+        drift = np.gradient(zero_phase_hann(np.stack([way.real, way.imag], axis=1), self.fps, 1.0), axis=0)
+        width = (left - right) * (drift[:, 0] - 1j * drift[:, 1]) / np.maximum(np.linalg.norm(drift, axis=1), 1e-9)
+        along, across = np.abs(width.real), np.abs(width.imag)
+        room = 2.0 * (along - np.sqrt(np.maximum(APART**2 - across**2, 0.0)))
+        return np.where(across > APART, np.inf, np.maximum(room, STRIDE[0]))
+
+    def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
+        """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot
+        lags."""
+        ahead = [run for run in runs(self.stands[:, side]) if run[1] > now]
+        return [run for run in ahead if self._drag(side, *run) > SPARED]
+
+    def _drag(self, side: int, first: int, end: int) -> float:
+        """How far the foot would lag at most in frames first .. end, 1 where a step is due."""
+        at, foot = slice(first, end), self.feet[side]
+        away = np.abs(foot.middle[at] - foot.middle[first]) / self.stride[at]
+        self.lag[at, side] = np.hypot(away, (foot.yaw[at] - foot.yaw[first]) / self.turn[at])
+        return float(self.lag[at, side].max(initial=0.0))
+
+    def run(self) -> None:
+        """Breaks stances until none drags any more, or none can be broken."""
+        now = 0
+        while any(self.left):
+            chosen = [self._next(side, now) for side in (_LEFT, _RIGHT)]
+            side = self._first(chosen)
+            stuck = [(self.left[side][0][1], side) for side in (_LEFT, _RIGHT) if self.left[side] and not chosen[side]]
+            if stuck and (side is None or min(stuck)[0] <= chosen[side][0]):
+                side = min(stuck)[1]
+                if not self._hold_other(side, now):
+                    self.left[side].pop(0)
+            elif self.lag[chosen[side][0], side] <= LATE or not self._hold_other(side, now):
+                now = chosen[side][0]
+                self._take(side, *chosen[side])
+
+    def _first(self, chosen: list[tuple[int, int] | None]) -> int | None:
+        """The foot that steps first, None where none does: the one that is due sooner; but where there is no time
+        for both before, the one that lags clearly more by then, unless it stepped last; or else the one that is
+        behind as the body goes."""
+        due = [side for side in (_LEFT, _RIGHT) if chosen[side]]
+        if len(due) < 2:
+            return due[0] if due else None
+        left, right = (found[0] for found in chosen)
+        first = min(left, right)
+        soon = min(first + int(self.swing[first]), len(self.speed) - 1)
+        more = self.lag[soon, _LEFT] - self.lag[soon, _RIGHT]
+        needier = _LEFT if more > 0.0 else _RIGHT
+        if abs(left - right) < self.swing[first] and abs(more) > CLEARLY and needier != self.last:
+            return needier
+        if left == right:
+            return _LEFT if self._behind(_LEFT, left) >= 0.0 else _RIGHT
+        return _LEFT if left < right else _RIGHT
+
+    def _take(self, side: int, at: int, down: int) -> None:
+        self.last, (_, end) = side, self.left[side].pop(0)
+        self.stands[at:down, side], self.stepped[at:down, side], self.lag[at:down, side] = False, True, 0.0
+        if down < end and self._drag(side, down, end) > SPARED:
+            self.left[side].insert(0, (down, end))
+
+    def _hold_other(self, side: int, now: int) -> bool:
+        """Leaves out the first gentle lift of the other foot during this foot's dragged stance with which it can
+        step; whether there is one."""
+        other, (first, end) = 1 - side, self.left[side][0]
+        foot, reach = self.feet[other], int(round(0.3 * self.fps))
+        for up, down in runs(~self.stands[:, other] & ~self.stepped[:, other]):
+            inside = max(now, 1) <= up < end and down > first
+            if inside and self._gentle(foot, up, down) and self.free_until[up] >= down:
+                kept = foot, self.stands.copy(), self.lag.copy(), self.left[other]
+                self.feet[other] = foot.with_lift_left_out(up, down, min(reach, up - now))
+                self.stands[up:down, other] = True
+                self._look_again(other, up)
+                if self._next(side, now):
+                    return True
+                self.feet[other], self.stands, self.lag, self.left[other] = kept
+        return False
+
+    def _look_again(self, side: int, at: int) -> None:
+        """Finds out whether the stance around frame `at` drags too far."""
+        first = int(np.flatnonzero(~self.stands[:at, side])[-1]) + 1 if not self.stands[:at, side].all() else 0
+        end = int(_until(self.stands[:, side])[at])
+        left = [run for run in self.left[side] if run[1] <= first or run[0] >= end]
+        self.left[side] = sorted([*left, (first, end)] if self._drag(side, first, end) > SPARED else left)
+
+    def _gentle(self, foot: _Foot, up: int, down: int) -> bool:
+        height, ends = foot.places[up:down, 2], foot.places[[up - 1, min(down, len(self.speed) - 1)], 2]
+        return bool(
+            down - up <= GENTLE_SECONDS * self.fps
+            and self.speed[up:down].max() < GENTLE_SPEED
+            and height.max() - ends.min() < GENTLE_HEIGHT
+        )
+
+    def _behind(self, side: int, at: int) -> float:
+        """How far the foot is behind the other as the body goes."""
+        before, after = max(at - 8, 0), min(at + 8, len(self.speed) - 1)
+        here, there = self.feet[side].middle, self.feet[1 - side].middle
+        return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
+
+    def _next(self, side: int, now: int) -> tuple[int, int] | None:
+        """Frames in which the foot's next dragged stance is to be broken, and in which it stands again; None where
+        there is none or it cannot be."""
+        if not self.left[side]:
+            return None
+        first, end = self.left[side][0]
+        down = self._down(side, first, end, now)
+        places = np.flatnonzero(down - np.arange(first, end) >= self.least)
+        if not len(places):
+            return None
+        lag = self.lag[first:end, side]
+        share = lag.max() / np.ceil(lag.max() / SPARED)
+        due = np.full(len(lag), share)
+        if any(a < end and first < b for a, b in self.left[1 - side][:1]):
+            # both lag alike: one goes at half time, so that they take turns
+            due *= 0.5 + 0.5 * np.clip(np.abs(lag - self.lag[first:end, 1 - side]) / (0.5 * share), 0.0, 1.0)
+        at = int(places[np.argmin(np.abs(places - np.argmax(lag >= due)))])
+        return first + at, int(down[at])
+
+    def _down(self, side: int, first: int, end: int, now: int) -> np.ndarray:
+        """(end - first,) frame in which a step that begins there would have to be over: the other foot stands firmly
+        as long."""
+        at = np.arange(first, end)
+        other = self.stands[:, 1 - side]
+        until = _until(other)[at]
+        until = np.where(until >= len(other), until, until - self.settled)
+        last = end - self.shortest if end < len(other) else end
+        down = np.minimum.reduce([at + self.swing[first:end], until, self.free_until[at], np.full(len(at), last)])
+        early = at < max(now, first + self.shortest if first else 0)
+        return np.where(early | ~other[np.maximum(at - self.settled, 0)], at, down)
+
+
+def _until(flags: np.ndarray) -> np.ndarray:
+    """(T + 1,) the first frame from each on in which `flags` (T,) is not set."""
+    count = len(flags)
+    unset = np.where(flags, count, np.arange(count))
+    return np.append(np.minimum.accumulate(unset[::-1])[::-1], count)
+
+
+def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """(T, 2, 2) m by which feet that step are set down further apart, so that the left one stays to the left of the
+    right one; left (T,): that way, complex. A stance's foot stands at the mean of where the body takes it
+    (`foot_plant.shift`)."""
+    stances = [runs(plan.stands[:, side]) for side in (_LEFT, _RIGHT)]
+    near = np.pad(stepped, ((1, 1), (0, 0)))
+    loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
+    place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
+    pushed = [[0.0j] * len(side) for side in place]
+    pairs = [
+        (i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
+        for i, (a, b) in enumerate(stances[_LEFT])
+        for j, (c, d) in enumerate(stances[_RIGHT])
+        if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])
+    ]
+    for _ in range(_ROUNDS):
+        for i, j, way in pairs:
+            between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
+            lacks = APART - float((between * way.conjugate()).real.min())
+            if lacks > 0.0:
+                share = lacks / (loose[_LEFT][i] + loose[_RIGHT][j])
+                pushed[_LEFT][i] += share * loose[_LEFT][i] * way
+                pushed[_RIGHT][j] -= share * loose[_RIGHT][j] * way
+    out = np.zeros((len(stepped), 2, 2))
+    for side in (_LEFT, _RIGHT):
+        if any(pushed[side]):
+            ends = np.ravel(stances[side]) - [0, 1] * len(stances[side])
+            by = np.interp(np.arange(len(out)), ends, np.repeat(pushed[side], 2))
+            out[:, side] = np.stack([by.real, by.imag], axis=1)
+    return out
+
+
+def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
+    """(T, 2) bool: where the toes are off the ground in steps taken while `stepped` (T, 2)."""
+    off, on = int(round(HEEL_OFF * fps)), int(round(TOE_ON * fps))
+    out = np.zeros_like(stepped)
+    for side in (_LEFT, _RIGHT):
+        for first, end in runs(stepped[:, side]):
+            out[first + off : end - on, side] = True
+    return out
+
+
+def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list[np.ndarray], fps: float):
+    """How steps taken while `stepped` (T, 2) look, whose toes are up in `swings` (T, 2): `moves` and `sway` of
+    Steps; root and both feet (T,) m, complex."""
+    moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
+    early = int(0.2 * fps)
+    for side in (_LEFT, _RIGHT):
+        for first, end in runs(stepped[:, side]):
+            moves[first:end, side, 3] = _tilt(_through(first, end))
+            low, high, middle = max(first - early, 0), min(end + early, len(root)), (first + end) // 2
+            over = feet[1 - side][middle] - root[middle]
+            over = SWAY * np.array([over.real, over.imag]) / max(abs(over), 1e-9)
+            sway[low:high] += np.sin(np.pi * _through(low, high))[:, None] ** 2 * over
+        for first, end in runs(swings[:, side]):
+            rising = np.clip(np.minimum(_through(first, end), 1.0 - _through(first, end)) / 0.45, 0.0, 1.0)
+            moves[first:end, side, 2] = LIFT * smoothstep(rising)
+    return moves, sway
+
+
+def _through(first: int, end: int) -> np.ndarray:
+    """How far each of frames first .. end is through them, between 0 and 1."""
+    return (np.arange(first, end) - first + 1.0) / (end - first + 1.0)
+
+
+def _tilt(through: np.ndarray) -> np.ndarray:
+    """Radians (N,) of heel over toe in a step that has come `through` (N,): the heel leaves first and lands first."""
+    return 6.75 * through * (1.0 - through) * (HEEL_UP * (1.0 - through) - TOE_UP * through)

@@ -1,0 +1,208 @@
+"""Key moments at the touches that the ball's samples tell, and the ball as physics and the feet have it.
+
+    plan = solve_touches(Plan(track=track, timeline=timeline, solve_touches=True))
+
+What `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search key moments move to solved
+touches; when the body is done, the ball goes through the places where it was met, as solved in between, and in dribbles
+step by step from foot to foot (`synthesis.construct.ball.dribble`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..annotation import KeyMoment, Timeline
+from ..annotation.ball_contact import striking_part, surfaces
+from ..annotation.labels import list_labels
+from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..base.errors import InputError, TimedLine
+from ..motion.track import BALL_RADIUS
+from .plan import Plan, SolvedCourse, Touched
+from .construct.ball.dribble import dribble
+from .construct.ball.meeting import led, lofted
+from .construct.ball.strike import held_frames
+from .resolved_plan import ResolvedPlan
+from .take import DribbleTouch, KeyResult, Take
+
+FURTHEST = 0.4
+"""Seconds from a key moment within which its touch is looked for."""
+
+_WITHIN = 1.5  # metres from the player within which a touch by nobody known may be his
+_NOT_MINE, _OTHER_PART, _OTHER_KIND = 0.15, 0.25, 0.15  # seconds that these are worth
+_UNSEEN = 0.1  # seconds from the nearest measured sample beyond which the ball counts as filled in
+_STEP = 0.004  # seconds between the points of a course
+_SENDING, _TAKING = frozenset(list_labels(ball="sends")), frozenset(list_labels(ball="takes"))
+_CARRYING = frozenset(list_labels(ball="carries"))
+_SENT = {kind.name for kind in TOUCH_KINDS if kind.ball in ("sends", "carries")}
+_TAKEN = {kind.name for kind in TOUCH_KINDS if kind.ball == "takes"}
+
+
+def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
+    """The plan with the ball's course solved and its key moments at the touches that they mean; without a course where
+    it is not to be solved or has no ball. known: the course, where an earlier take of the same track has it."""
+    if not plan.solve_touches:
+        return plan if plan.solved is None else replace(plan, solved=None)
+    course = plan.solved or known or course_of_track(plan)
+    return plan if course is None else replace(plan, solved=course, timeline=_moved(plan.timeline, course.touches))
+
+
+def course_of_track(plan: Plan) -> SolvedCourse | None:
+    """The course of the ball of one player's track, solved from its samples alone; None where these are too few."""
+    from ..ball.solve_ball import solve_ball
+
+    try:
+        solved = solve_ball(plan.track)
+    except InputError:
+        return None
+    return course_of(solved, plan.track.name, plan)
+
+
+def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
+    """A solved ball as this player's plan has it: over the plan's time, with his touches told from others'."""
+    first, last = plan.track.times[[0, -1]]
+    inside = [touch for touch in solved.touches if first <= touch.time <= last]
+    even = np.linspace(first, last, int(np.ceil((last - first) / _STEP)) + 1)
+    times = np.union1d(even, [touch.time for touch in inside])
+    begins, ends = solved.pieces[0].start, solved.pieces[-1].end
+    pairs = zip(solved.pieces, solved.pieces[1:])
+    gone = np.array([[before.end, after.start] for before, after in pairs]).reshape(-1, 2)
+    unknown = (times < begins) | (times > ends)
+    for end, start in gone[gone[:, 1] - gone[:, 0] > _STEP]:
+        unknown |= (times > end) & (times < start)
+    ball = np.maximum(solved.ball.at(times), [-np.inf, -np.inf, BALL_RADIUS])
+    ball = np.where(unknown[:, None], np.nan, ball)
+    seen = solved.times[solved.measured]
+    return SolvedCourse(times, ball, _far(times, seen), tuple(_touched(touch, player, plan) for touch in inside))
+
+
+def _far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """(M,) bool: more than _UNSEEN seconds from the nearest of the times `seen` (K,)."""
+    if len(seen) < 2:
+        return np.ones(len(times), bool)
+    after = np.clip(np.searchsorted(seen, times), 1, len(seen) - 1)
+    return np.minimum(np.abs(times - seen[after - 1]), np.abs(seen[after] - times)) > _UNSEEN
+
+
+def _touched(touch: SolvedTouch, player: str, plan: Plan) -> Touched:
+    mine: bool | None = touch.player == player
+    if not touch.player:
+        place = [np.interp(touch.time, plan.track.times, plan.track.positions[:, axis]) for axis in (0, 1)]
+        mine = None if np.linalg.norm(touch.position[:2] - place) <= _WITHIN else False
+    heights = plan.track.ball_height_known[np.abs(plan.track.times - touch.time).argmin()]
+    part = touch.part if heights or touch.kind == THROW_IN else ""
+    return Touched(touch.time, mine, part, touch.kind)
+
+
+def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
+    """The timeline with key moments at the touches that suit them best, each touch for one, in the order of both.
+
+    Key moments and touches are brought together as two lines of text are: a key moment without a touch costs FURTHEST,
+    one with a touch the seconds in between and what of the touch does not fit its words.
+    """
+    keys = [replace(key, solved=None) for key in timeline.keys]
+    mine = [touch for touch in touches if touch.mine is not False]
+    best = np.full((len(keys) + 1, len(mine) + 1), np.inf)
+    best[0], taken = 0.0, np.zeros((len(keys) + 1, len(mine) + 1), int)
+    for row, key in enumerate(keys, 1):
+        for column in range(len(mine) + 1):
+            ways = [best[row - 1, column] + FURTHEST]
+            if column:
+                ways += [best[row, column - 1], best[row - 1, column - 1] + _unlike(key, mine[column - 1])]
+            taken[row, column] = int(np.argmin(ways))
+            best[row, column] = min(ways)
+    row, column, moved = len(keys), len(mine), keys[:]
+    while row:
+        way = taken[row, column]
+        if way == 2:
+            moved[row - 1] = replace(keys[row - 1], solved=mine[column - 1].time)
+        row, column = row - (way != 1), column - (way > 0)
+    return replace(timeline, keys=tuple(_in_order(moved)))
+
+
+def _unlike(key: KeyMoment, touch: Touched) -> float:
+    """Seconds: how far a touch is from a key moment and its words; inf where it cannot be meant."""
+    part, words, off = striking_part(key.words), set(key.words), abs(touch.time - key.time)
+    if part is None or off > FURTHEST:
+        return np.inf
+    wanted = _SENT if _SENDING & words else _TAKEN if _TAKING & words else {touch.kind}
+    unlike = _NOT_MINE * (touch.mine is None) + _OTHER_KIND * (touch.kind not in wanted)
+    unlike += _OTHER_PART * (touch.part not in ("", part))
+    return off + unlike
+
+
+def _in_order(keys: list[KeyMoment]) -> list[KeyMoment]:
+    """Key moments that would pass one another by their solved times stay where they were asked for."""
+    while True:
+        pairs = list(enumerate(zip(keys, keys[1:])))
+        crossing = [n for n, (a, b) in pairs if a.in_force > b.in_force or a.in_force == b.in_force and a.time < b.time]
+        if not crossing:
+            return keys
+        for number in {m for n in crossing for m in (n, n + 1)}:
+            keys[number] = replace(keys[number], solved=None)
+
+
+def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
+    """A line for every key moment that asks for a touch where the ball's course has none, and for every dribble in
+    which no foot touches the ball. take: `with_course`."""
+    if plan.course is None:
+        told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
+        return [told] if plan.asked.solve_touches else []
+    missing = [
+        TimedLine(
+            f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
+            "it stays where it is asked for", (key.time, key.time),
+        ) for key in plan.timeline.keys if striking_part(key.words) and key.solved is None
+    ]  # fmt: skip
+    touched = np.array([take.start_time + push.first / take.motion.fps for push in take.dribbled])
+    return missing + [
+        TimedLine(
+            f"{span.start:g}-{span.end:g} s: no foot touches the ball in this "
+            f"'{' '.join(sorted(_CARRYING.intersection(span.words)))}': it is too short, or no foot "
+            "comes near", (span.start, span.end),
+        ) for span in plan.timeline.spans
+        if _CARRYING.intersection(span.words) and not ((touched >= span.start) & (touched <= span.end)).any()
+    ]  # fmt: skip
+
+
+def with_course(take: Take, plan: ResolvedPlan) -> Take:
+    """The take with the ball as solved, through the places where it was met, and touched step by step in dribbles; as
+    it is, where nothing is solved."""
+    if plan.course is None or take.ball is None:
+        return replace(take, solved=plan.course)
+    fps, met, times = take.motion.fps, take.ball.positions, take.ball.times
+    held = [held_frames(key.frame, len(met)) for key in _touching(take)]
+    turns = [(touch.time - take.start_time) * fps for touch in plan.course.touches]
+    course, filled = plan.course.at(times)
+    path = np.where(np.isfinite(course), course, met)
+    known = np.interp(times, plan.track.times, plan.track.ball_height_known.astype(float)) > 0.5
+    for number, pair in enumerate(held):
+        path = lofted(path, float(np.mean(pair)), float(met[list(pair), 2].mean()), ~known, fps)
+        path = led(path, pair, met[list(pair)], _around(pair, held[:number] + held[number + 1 :], turns, fps))
+    stretches = [
+        ((span.start - take.start_time) * fps, (span.end - take.start_time) * fps)
+        for span in plan.timeline.spans if _CARRYING.intersection(span.words)
+    ]  # fmt: skip
+    standing = take.contacts if take.stepped is None else take.contacts | take.stepped
+    done = dribble(
+        take.motion.skeleton, take.motion.root_positions, take.motion.rotations, standing, path, stretches, held, fps,
+        measured=take.ball.measured & ~filled, turns=turns,
+    )
+    pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in done.pushes)
+    ball = replace(take.ball, positions=done.ball)
+    return replace(take, ball=ball, solved=plan.course, met_ball=take.ball, dribbled=pushes)
+
+
+def _touching(take: Take) -> list[KeyResult]:
+    """The key moments in which some part meets the ball, in the order of time."""
+    skeleton = take.motion.skeleton
+    return sorted((key for key in take.keys if surfaces(skeleton, key.touching)), key=lambda key: key.frame)
+
+
+def _around(pair: tuple[int, int], others: list[tuple[int, int]], turns: list[float], fps: float) -> tuple[int, int]:
+    """The frames before and after a touch at which the ball changes its course anyway, but for the touch itself."""
+    low = [*(p[1] for p in others if p[1] <= pair[0]), *(int(np.floor(turn)) for turn in turns if turn < pair[0] - 1.5)]
+    high = [*(p[0] for p in others if p[0] >= pair[1]), *(int(np.ceil(turn)) for turn in turns if turn > pair[1] + 1.5)]
+    return max(low, default=pair[0] - int(fps)), min(high, default=pair[1] + int(fps))

@@ -1,0 +1,43 @@
+"""Pins as a table: `time_s,part,x_m,y_m,z_m,hold_s`, a line for each place where a hand, a foot or the gaze has to
+be."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+
+from ..annotation import read_text
+from ..base.errors import InputError
+from .plan import Pin
+
+COLUMNS = ("time_s", "part", "x_m", "y_m", "z_m", "hold_s")
+
+
+def read_pins(path: str | os.PathLike) -> tuple[Pin, ...]:
+    """The pins of a CSV file, in the order of its lines: seconds on the track's clock, metres in the world, Z up.
+    hold_s may be missing or blank (a moment). InputError names the line that is not of this form."""
+    reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
+    try:
+        missing = [name for name in COLUMNS[:-1] if name not in (reader.fieldnames or ())]
+        if missing:
+            raise InputError(f"{path}:1", f"no column {', '.join(missing)}", f"a header with {','.join(COLUMNS)}")
+        return tuple(_pin(row, f"{path}:{reader.line_num}") for row in reader)
+    except csv.Error as error:
+        raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
+
+
+def _pin(row: dict, place: str) -> Pin:
+    time, x, y, z, hold = (_number(row, name, place) for name in ("time_s", "x_m", "y_m", "z_m", "hold_s"))
+    try:
+        return Pin(time, (row["part"] or "").strip().lower(), (x, y, z), hold)
+    except InputError as error:
+        raise InputError(place, str(error)) from None
+
+
+def _number(row: dict, name: str, place: str) -> float:
+    text = (row.get(name) or "").strip()
+    try:
+        return float(text) if text or name != "hold_s" else 0.0
+    except ValueError:
+        raise InputError(place, f"{name} {text!r}", "a number") from None

@@ -1,0 +1,176 @@
+"""What is asked: a plan names the track, the timeline, the ball, pins and the library's folder,
+and how to go about it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ..annotation import Timeline
+from ..base.settings import defaults, rows_of, setting
+from ..base.settings.setting import check_limits
+from ..base.errors import InputError, told_time
+from ..motion.skeleton import frozen_array
+from ..motion.track import SampledTrack, Track, sample
+
+PARTS = ("left_hand", "right_hand", "left_foot", "right_foot", "gaze")
+FEET = ("", "left", "right")
+METHODS = setting("synthesis", "method").choice_names
+_DEFAULTS = defaults("synthesis", "player")
+_HEIGHT = setting("player", "height")
+
+LATER = {"later": True}
+"""Marks fields that came after files were saved with fingerprints of the others."""
+
+@dataclass(frozen=True)
+class Pin:
+    """A part of the body held at a place. time: s on the track's clock from which on; hold: s for which, 0 for a
+    moment. part: one of PARTS; hands and feet are pinned by their joint (wrist, ankle), the gaze is turned to the
+    place. position: (x, y, z) m in the world. InputError for an unknown part and for numbers that are none."""
+
+    time: float
+    part: str
+    position: tuple[float, float, float]
+    hold: float = 0.0
+
+    def __post_init__(self):
+        if self.part not in PARTS:
+            raise InputError("pin", f"the part {self.part!r}", f"one of {', '.join(PARTS)}")
+        object.__setattr__(self, "time", float(self.time))
+        object.__setattr__(self, "hold", float(self.hold))
+        object.__setattr__(self, "position", tuple(float(value) for value in self.position))
+        if len(self.position) != 3 or not all(map(math.isfinite, (*self.position, self.time, self.hold))):
+            raise InputError("pin", f"{self.time:g} s, {self.position}, {self.hold:g} s", "a time, a place and a hold")
+        if self.hold < 0.0:
+            raise InputError("pin", f"a hold of {self.hold:g} s", "0 s or more")
+
+    @property
+    def end(self) -> float:
+        """Seconds at which the part is let go."""
+        return self.time + self.hold
+
+
+@dataclass(frozen=True)
+class Touched:
+    """Somebody changed the ball's course. time: s; mine: whether it was this player, None where nobody tracked was
+    near; part: "foot", "head", "chest", "hand", or "" where that cannot be told; kind: a word such as "kick" or
+    "receive"."""
+
+    time: float
+    mine: bool | None
+    part: str
+    kind: str
+
+
+@dataclass(frozen=True, eq=False)
+class SolvedCourse:
+    """The ball's course as it was solved from its samples: times (M,) s, ascending; ball (M, 3) m, its centre, NaN
+    where it is not known; filled (M,) bool, where the feed has not measured it. touches: in order, everybody's."""
+
+    times: np.ndarray
+    ball: np.ndarray
+    filled: np.ndarray
+    touches: tuple[Touched, ...] = ()
+
+    def __post_init__(self):
+        object.__setattr__(self, "times", frozen_array(self.times))
+        object.__setattr__(self, "ball", frozen_array(self.ball))
+        object.__setattr__(self, "filled", frozen_array(self.filled, bool))
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The ball (T, 3) m at `times` (T,) s, NaN where it is not known,
+        and whether the feed has filled it in (T,)."""
+        ball = np.stack([np.interp(times, self.times, column, np.nan, np.nan) for column in self.ball.T], axis=1)
+        near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
+        return ball, self.filled[near]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One player's order. The fields with a default of the settings table mean what is said there.
+
+    track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
+    asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. pins: where hands,
+    feet and gaze have to be, in the order of time. gaits: (gait word, clip) pairs; other gaits are found among all
+    clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
+    solved: the ball's course where it is known already, such as from a whole match.
+
+    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.balance`), delta §3.2.4, omega and gaits
+    §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`, track_window
+    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error is always measured
+    with a root_window of 1.5.
+
+    InputError for a number outside the limits of its setting, and for two pins of one part at one time.
+    """
+
+    track: Track
+    timeline: Timeline = field(default_factory=Timeline)
+    library: str = ""
+    method: str = _DEFAULTS["method"]
+    catch_up: bool = _DEFAULTS["catch_up"]
+    fps: float = _DEFAULTS["fps"]
+    alpha: float = _DEFAULTS["alpha"]
+    mirror: bool = _DEFAULTS["mirror"]
+    nearest: bool = _DEFAULTS["nearest"]
+    seed: int = _DEFAULTS["seed"]
+    delta: float = _DEFAULTS["delta"]
+    omega: float = _DEFAULTS["omega"]
+    made: bool = _DEFAULTS["made"]
+    seam_window: float = _DEFAULTS["seam_window"]
+    track_window: float = _DEFAULTS["track_window"]
+    root_window: float = _DEFAULTS["root_window"]
+    gaits: tuple[tuple[str, str], ...] = ()
+    pins: tuple[Pin, ...] = ()
+    height: float = 0.0
+    strong_foot: str = ""
+    style: tuple[str, ...] = ()
+    style_weight: float = _DEFAULTS["style_weight"]
+    solve_touches: bool = field(default=_DEFAULTS["solve_touches"], metadata=LATER)
+    variety: float = field(default=_DEFAULTS["variety"], metadata=LATER)
+    lag: float = field(default=_DEFAULTS["lag"], metadata=LATER)
+    solved: SolvedCourse | None = field(default=None, compare=False, repr=False, metadata=LATER)
+
+    def __post_init__(self):
+        object.__setattr__(self, "pins", tuple(sorted(self.pins, key=lambda pin: (pin.time, pin.part))))
+        object.__setattr__(self, "style", tuple(dict.fromkeys(self.style)))
+        check_limits(self, (*rows_of("synthesis"), *rows_of("player")))
+        if 0.0 < self.omega < 1.0:
+            raise InputError("omega", f"{self.omega:g}", "1 or more, or 0 for the usual thresholds")
+        if self.height and not _HEIGHT.least <= self.height <= _HEIGHT.most:
+            limits = f"{_HEIGHT.least:g} to {_HEIGHT.most:g} m, or 0 for the library's"
+            raise InputError("height", f"{self.height:g} m", limits)
+        if self.strong_foot not in FEET:
+            raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
+        self._check_pins()
+
+    def sampled(self, fps: float) -> SampledTrack:
+        """The track at `fps` frames per second, as `sample_with_course` has it."""
+        return sample_with_course(self.track, self.solved, fps, self.track_window)
+
+    def _check_pins(self):
+        for part in PARTS:
+            mine = [pin for pin in self.pins if pin.part == part]
+            for before, after in zip(mine, mine[1:]):
+                if after.time <= before.end:
+                    found = f"two pins of {part} at {told_time(after.time)} s"
+                    raise InputError("pins", found, "one place at a time", "move one, or shorten the hold before it")
+
+
+def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, window: float) -> SampledTrack:
+    """Sample a track at `fps` frames per second.
+
+    Where its ball is solved, it has the solved height, and the solved place where the feed has not measured it: where
+    it has, the ball is met within the noise of the measurement. window: s that take the feed's jitter out.
+    """
+    sampled = sample(track, fps, window)
+    if course is None:
+        return sampled
+    ball, filled = course.at(sampled.times)
+    known = np.isfinite(ball).all(axis=1)
+    measured = sampled.ball_measured & ~(known & filled)
+    return replace(
+        sampled, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, sampled.ball),
+        ball_measured=measured,
+    )  # fmt: skip

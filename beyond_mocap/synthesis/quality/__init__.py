@@ -1,0 +1,1 @@
+"""What a take is measured by while it is made, and what gave way."""

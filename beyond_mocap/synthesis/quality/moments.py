@@ -1,0 +1,180 @@
+"""Key moments: which clip served each, when its key frame is played, and where body and ball were."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...annotation import KeyMoment
+from ...annotation.ball_contact import contact_gap, meeting_words, met_within
+from ...library.library import Library
+from ...library.made import MADE_FOLDER
+from ...annotation.striking import part_surfaces, smallest_gap
+from ...motion.track import Track
+from ..take import DribbleTouch
+from . import pieces
+from .played import Played
+
+
+@dataclass(frozen=True)
+class Moment:
+    """How one key moment was served.
+
+    asked: the timeline's line. frame: output frame nearest to the time in force (the asked or the solved one). clip,
+    clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds
+    on the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
+    `frame`. entry, exit: first and last output frame, without a seam between, that the clip's annotated row covers.
+    used_instead: words in place of the asked ones, None where the asked ones were had.
+    """
+
+    asked: KeyMoment
+    frame: int
+    clip: str | None
+    clip_frame: float | None
+    played_at: float
+    words: tuple[str, ...]
+    entry: int
+    exit: int
+    used_instead: tuple[str, ...] | None
+
+
+def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
+    """Every asked key moment as it was played; stride (T,): source frames per output frame at recorded speed."""
+    starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
+    number = pieces.runs(len(played.clip), starts)
+    told = {result.asked: result for result in played.keys}
+    library = with_made(library, played)
+    return [_moment(played, key, number, told.get(key), library) for key in keys]
+
+
+def with_made(library: Library | None, played: Played) -> Library | None:
+    """The library whose gaits and key moments were played: with its made clips where one of them is shown."""
+    if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
+        return library
+    return library.extended
+
+
+def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library: Library | None) -> Moment:
+    frame = _frame_at(played, (key.in_force - played.start_time) * played.motion.fps)
+    run = np.flatnonzero(number == number[frame if result is None else _frame_at(played, result.frame)])
+    words = () if played.words is None else tuple(played.words[frame])
+    found = _key_in_run(played, run, frame, key, library)
+    instead = _instead(key, words if found is None else found.words, result)
+    if found is None:
+        known = played.clip[frame] >= 0
+        shown = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
+        return Moment(key, frame, *shown, np.nan, words, frame, frame, instead)
+    inside = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)]
+    entry, leave = (inside[0], inside[-1]) if len(inside) else (frame, frame)
+    at = crossing(played.clip_frame[run], played.times[run], found.frame)
+    clip = played.clips[played.clip[run[0]]]
+    return Moment(key, frame, clip, found.frame, at, words, int(entry), int(leave), instead)
+
+
+def _frame_at(played: Played, frame: float) -> int:
+    return int(np.clip(np.rint(frame), 0, len(played.motion) - 1))
+
+
+def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
+    """The library's key that the run plays: carrying the asked words if any does, then nearest to what `frame`
+    shows."""
+    if library is None or played.clip[run[0]] < 0:
+        return None
+    path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
+    own = [k for k in library.keys if library.clips[k.clip].path == path and library.clips[k.clip].mirrored == side]
+    own = [k for k in own if np.isfinite(crossing(played.clip_frame[run], played.times[run], k.frame))]
+    carrying = [k for k in own if set(key.words) <= set(k.words)] or own
+    return min(carrying, key=lambda k: abs(k.frame - played.clip_frame[frame]), default=None)
+
+
+def _instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
+    """The words used in place of the asked ones: what a take says of it, else those played where they lack some."""
+    if result is not None and result.used_instead is not None:
+        return tuple(result.used_instead)
+    return None if set(key.words) <= set(words) else tuple(sorted(words))
+
+
+def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> float:
+    """Seconds at which a run plays `key_frame`: clip_frames (R,) ascending, times (R,) s.
+
+    Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never
+    played.
+    """
+    if len(times) < 2 or not np.all(np.diff(clip_frames) > 0):
+        hit = np.flatnonzero(np.abs(clip_frames - key_frame) < 0.5)
+        return float(times[hit[0]]) if len(hit) else np.nan
+    first, last = clip_frames[1] - clip_frames[0], clip_frames[-1] - clip_frames[-2]
+    step = times[1] - times[0]
+    longer = np.concatenate([[clip_frames[0] - first], clip_frames, [clip_frames[-1] + last]])
+    if not longer[0] <= key_frame <= longer[-1]:
+        return np.nan
+    return float(np.interp(key_frame, longer, np.concatenate([[times[0] - step], times, [times[-1] + step]])))
+
+
+def ball_gap(played: Played, moment: Moment) -> float:
+    """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
+    nearest to the asked time (`striking.contact_gap`, overlap counted as distance too); NaN without ball or part.
+
+    The part is that of the words which are played there; of the asked ones where those touch no ball.
+    """
+    if played.ball is None:
+        return np.nan
+    pose = played.positions[moment.frame], played.rotations[moment.frame]
+    words = touching_words(moment)
+    return abs(float(contact_gap(played.motion.skeleton, *pose, words, written_ball(played, moment.frame))))
+
+
+def met(played: Played, moment: Moment) -> tuple[float, float]:
+    """Seconds on the track's clock at which the ball is met, and the gap there, m, as `ball_gap` measures it. Both are
+    the key moment's, but for dives, in which a hand meets the ball at its nearest on the flight
+    (`striking.met_within`); NaN without ball or part."""
+    last = min(moment.frame + int(met_within(touching_words(moment)) * played.motion.fps), len(played.motion) - 1)
+    frames = range(moment.frame, last + 1)
+    gaps = [ball_gap(played, replace(moment, frame=frame)) for frame in frames]
+    if not np.isfinite(gaps).any():
+        return np.nan, np.nan
+    nearest = int(np.nanargmin(gaps))
+    return float(played.times[frames[nearest]]), gaps[nearest]
+
+
+def touching_words(moment: Moment) -> tuple[str, ...]:
+    """The words that say which part meets the ball (`striking.meeting_words`)."""
+    return meeting_words(moment.words, moment.asked.words)
+
+
+def written_ball(played: Played, frame: int) -> np.ndarray:
+    """The ball's centre (3,) m as written out with the take, at the row nearest to an output frame's time."""
+    row = int(np.argmin(np.abs(played.ball.times - played.times[frame])))
+    return played.ball.positions[row]
+
+
+def dribble_touches(played: Played, touches: Sequence[DribbleTouch], track: Track | None) -> list[dict]:
+    """Every touch of a dribble: its second, the foot, the largest gap of the foot's surface and the ball's while it
+    lasts, and how far the ball lies from its samples where it begins, m."""
+    return [
+        {
+            "time_s": float(played.times[touch.first]),
+            "side": touch.side,
+            "contact_gap_m": max(_foot_gap(played, frame, touch.side) for frame in range(touch.first, touch.last + 1)),
+            "ball_shift_m": None if track is None else ball_shift(played, touch.first, track),
+        } for touch in touches
+    ]  # fmt: skip
+
+
+def _foot_gap(played: Played, frame: int, side: str) -> float:
+    pose = played.positions[frame], played.rotations[frame]
+    foot = part_surfaces(played.motion.skeleton, "foot", (side,))
+    return abs(float(smallest_gap(foot, *pose, written_ball(played, frame))))
+
+
+def ball_shift(played: Played, frame: int, track: Track) -> float:
+    """How far on the ground the written ball lies from the measured one (straight lines between samples), m; NaN where
+    either is missing."""
+    known = np.isfinite(track.ball[:, :2]).all(axis=1)
+    if played.ball is None or not known.any():
+        return np.nan
+    time = played.times[frame]
+    measured = [np.interp(time, track.times[known], track.ball[known, axis]) for axis in (0, 1)]
+    return float(np.linalg.norm(written_ball(played, frame)[:2] - measured))

@@ -1,0 +1,141 @@
+"""What was played: a body's motion, the ball, and where every frame came from; the same from memory and from files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...base.errors import InputError
+from ...library.library import Library
+from ...library.landings import LANDING_FOLDER
+from ...library.made import FPS as MADE_FPS
+from ...library.made import MADE_FOLDER
+from ...motion import contacts as foot_contacts
+from ...motion.humanoid import Humanoid, identify
+from ...motion.motion import Motion, forward_kinematics
+from ...motion.track.ball_path import BallPath
+from ..take import KeyResult, Take
+from .feet import foot_joints
+
+
+@dataclass(frozen=True, eq=False)
+class Played:
+    """One player's take as evaluation sees it.
+
+    motion: T frames on the pitch; frame 0 is at `start_time` s on the track's clock. clips: table of clip paths below
+    the library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that
+    clip's own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after
+    mirroring, or None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each
+    foot was moved by polish, or None. keys: how key moments were served, empty where only files tell.
+    """
+
+    motion: Motion
+    start_time: float
+    clips: tuple[str, ...]
+    clip: np.ndarray
+    clip_frame: np.ndarray
+    mirrored: np.ndarray
+    words: tuple[tuple[str, ...], ...] | None
+    contacts: np.ndarray
+    ball: BallPath | None = None
+    correction: np.ndarray | None = None
+    keys: tuple[KeyResult, ...] = ()
+
+    @property
+    def times(self) -> np.ndarray:
+        """Seconds (T,) on the track's clock."""
+        return self.start_time + np.arange(len(self.motion)) / self.motion.fps
+
+    @cached_property
+    def body(self) -> Humanoid:
+        """The meaning of the skeleton's joints."""
+        return identify(self.motion.skeleton)
+
+    @cached_property
+    def _kinematics(self) -> tuple[np.ndarray, np.ndarray]:
+        return forward_kinematics(self.motion)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """World positions (T, J, 3) m of the joints."""
+        return self._kinematics[0]
+
+    @property
+    def rotations(self) -> np.ndarray:
+        """World rotations (T, J, 4) of the joints."""
+        return self._kinematics[1]
+
+    @property
+    def pelvis(self) -> np.ndarray:
+        """Ground positions (T, 2) m of the hips joint."""
+        return self.positions[:, self.body.hips, :2]
+
+    @property
+    def feet(self) -> np.ndarray:
+        """World positions (T, 2, 2, 3) m: side, (heel, toe)."""
+        return self.positions[:, foot_joints(self.motion.skeleton)]
+
+    def stride(self, library: Library | None) -> np.ndarray:
+        """Source frames that pass per output frame at recorded speed, (T,); the usual step of clips whose own rate is
+        not known, as it is without a library."""
+        known = {} if library is None else {clip.path: clip.motion.fps for clip in library.clips}
+        rates = np.ones(len(self.clips) + 1)
+        for index, path in enumerate(self.clips):
+            fps = MADE_FPS if path.startswith(MADE_FOLDER) else known.get(path.removeprefix(LANDING_FOLDER))
+            rates[index] = fps / self.motion.fps if fps else _usual_step(self.clip_frame, self.clip == index)
+        return rates[self.clip]
+
+
+def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if len(forward) else 1.0
+
+
+def played_from_take(take: Take) -> Played:
+    """What a take in memory plays."""
+    return Played(
+        motion=take.motion,
+        start_time=take.start_time,
+        clips=tuple(take.clips),
+        clip=np.asarray(take.clip, dtype=int),
+        clip_frame=np.asarray(take.clip_frame, dtype=float),
+        mirrored=np.asarray(take.mirrored, dtype=bool),
+        words=tuple(take.words),
+        contacts=np.asarray(take.contacts, dtype=bool),
+        ball=take.ball,
+        correction=take.correction,
+        keys=tuple(take.keys),
+    )
+
+
+def played_from_tables(
+    motion: Motion, provenance=None, ball: BallPath | None = None, start_time: float = 0.0, where: str = "provenance"
+) -> Played:
+    """What a motion read from a file plays, with its provenance and ball where they are known.
+
+    provenance: `files.tables.Provenance`, or anything with its arrays: times (T,) s, clip (T paths), clip_frame (T,),
+    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and
+    contacts are detected on the motion itself. where: the table's file, for messages. InputError where it has another
+    length.
+    """
+    count = len(motion)
+    if provenance is None:
+        unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
+        return Played(motion, start_time, (), unknown, nowhere, plain, None, foot_contacts.detect(motion), ball)
+    if len(provenance.clip) != count:
+        raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
+    clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
+    return Played(
+        motion=motion,
+        start_time=float(provenance.times[0]),
+        clips=tuple(str(clip) for clip in clips),
+        clip=index.reshape(-1),
+        clip_frame=np.asarray(provenance.clip_frame, dtype=float),
+        mirrored=np.asarray(provenance.mirrored, dtype=bool),
+        words=tuple(map(tuple, provenance.words)),
+        contacts=np.asarray(provenance.contacts, dtype=bool),
+        ball=ball,
+    )

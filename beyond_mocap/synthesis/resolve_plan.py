@@ -1,0 +1,44 @@
+"""From a plan as it is asked to one that can be searched: touches solved, the player in the library's size.
+
+    plan = resolve_plan(Plan(track=track, timeline=timeline, height=1.7, solve_touches=True), library)
+    order = build_order(library, plan)
+
+A player of s times the height of the library's skeleton who runs 5 m/s moves as the library does at 5 / s m/s. So the
+track and the ball are divided by s here, and skeleton and root are multiplied by s in the end (`own_size`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from .known_touches import solve_touches
+from ..library.library import Library
+from ..motion.humanoid import stature
+from ..motion.track import Track
+from .plan import Plan, SolvedCourse
+from .resolved_plan import ResolvedPlan
+
+
+def resolve_plan(
+    plan: Plan, library: Library, *, course: SolvedCourse | None = None, touches_solved: bool = False
+) -> ResolvedPlan:
+    """Solve the touches and the body size of a plan for a library.
+
+    Args:
+        plan: what is asked.
+        library: the clips it is made from.
+        course: the ball's course, where an earlier take of the same track has it.
+        touches_solved: whether the plan's key moments are at its touches already (`known_touches.solve_touches`).
+    """
+    known = plan if touches_solved else solve_touches(plan, course)
+    size = plan.height / stature(library.skeleton) if plan.height else 1.0
+    return ResolvedPlan(
+        asked=plan, timeline=known.timeline, track=_scaled(known.track, size), course=known.solved, size=size
+    )
+
+
+def _scaled(track: Track, size: float) -> Track:
+    if size == 1.0:
+        return track
+    ball = None if track.ball is None else track.ball / size
+    return replace(track, positions=track.positions / size, ball=ball)

@@ -1,0 +1,339 @@
+"""The recipe for edits: a take after a change of its plan, made anew only where the change touches it.
+
+    take = synthesize(library, plan)
+    plan = replace(plan, timeline=with_the_kick_a_little_later)
+    take = resynthesize(library, plan, take)
+
+What counts as touched is said in `synthesis.search.touched`. Touched stretches are searched between frames that stay
+(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to
+the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only where the body turns a
+full turn more or less than before, the quaternions behind may have the other sign, since a motion's signs are
+continuous.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.errors import InputError, told_time
+from ..library.library import Library
+from ..motion.motion import Motion
+from ..motion.track import SampledTrack
+from .own_size import taken_in_library_size
+from .plan import Plan
+from .construct.hand_over import handed_over, old_share
+from .construct.smoothing import reaches
+from .resolve_plan import resolve_plan
+from .search.balance import balanced
+from .construct.construction import Construction
+from .construct.key_moments import find_touches, key_results
+from .construct.old_motion import OldMotion
+from .search.edit_list import EditList
+from .search.footage import Shown, fetch, output_index, shown
+from .frame_sources import sources_shown, words_shown
+from .search.offer import SLOT
+from .search.path_search import Between, PathSearch
+from .resolved_plan import ResolvedPlan
+from .search_library import search_library
+from .search.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
+from .search.used import Used, used_in
+from .search.wanted import Wanted, build_order
+from .synthesize import Progress, finished, synthesize
+from ..motion.track.ball_path import BallPath
+from .take import KeyResult, Take
+
+HAND_OVER = 0.5
+"""Seconds before and behind a touched stretch in which its motion goes over into the old one."""
+
+CONTEXT = 1.2
+"""Seconds further out that are laid out too, so that the ends of windows and solves lie outside what is used."""
+
+
+@dataclass(frozen=True)
+class Anew:
+    """A stretch, seconds on the track's clock, of which another solution is wanted, and footage to do without where
+    that can be (`shown_footage` of what is shown there now)."""
+
+    start: float
+    end: float
+    used: tuple[Used, ...] = ()
+
+
+def resynthesize(
+    library: Library,
+    plan: Plan,
+    before: Take,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    hurry: Callable[[], bool] | None = None,
+    anew: Anew | None = None,
+) -> Take:
+    """The take `before` after its plan has become `plan`: searched and built anew only where the change touches it.
+
+    Pins are laid on anew. A whole synthesis where the change is not one of words, track, ball or pins (another method,
+    rate, length or choice), where `before` was made from another library or by another method than "path", or where all
+    of it is touched. The same library, plan and take give the same bits. anew: a stretch of which another solution is
+    wanted, whether or not its plan has changed; InputError where it lies outside the take, or for another method than
+    "path". progress, cancelled, hurry and what is raised: as for `synthesize`.
+    """
+    from threadpoolctl import threadpool_limits
+
+    report = progress or (lambda fraction, text: None)
+    if anew is not None:
+        _check(plan, before, anew)
+    asking = {"cancelled": cancelled, "hurry": hurry}
+    with threadpool_limits(limits=1):
+        comparable = _comparable(plan, before)
+        taken = _edited(library, plan, before, report, **asking, anew=anew) if comparable else None
+    used = anew.used if anew is not None else ()
+    return synthesize(library, plan, progress, **asking, used=used) if taken is None else taken
+
+
+def shown_footage(library: Library, take: Take, start: float, end: float) -> tuple[Used, ...]:
+    """The footage that a take of method "path" shows from second `start` to second `end`, for `Anew`; nothing where the
+    take was made from another library."""
+    library = search_library(library, resolve_plan(take.plan, library, course=take.solved))
+    if take.edit is None or not _made_from(library, take, len(take.edit)):
+        return ()
+    first, last = (int(round((second - take.start_time) * library.fps)) for second in (start, end))
+    return used_in(library, take.edit, max(0, first), min(len(take.edit), max(last, first + 1)))
+
+
+def _check(plan: Plan, before: Take, anew: Anew) -> None:
+    low, high = before.start_time, before.start_time + before.motion.duration
+    if plan.method != "path":
+        raise InputError("a stretch made anew", f"method {plan.method}", "method path", "synthesize the whole take")
+    if not low <= anew.start < anew.end <= high + 0.5 / before.motion.fps:
+        found = f"{told_time(anew.start)} to {told_time(anew.end)} s"
+        expected = f"a stretch within {told_time(low)} to {told_time(high)} s"
+        raise InputError("a stretch made anew", found, expected)
+
+
+def _comparable(plan: Plan, before: Take) -> bool:
+    old = before.plan
+    if old is None or plan.method != "path":
+        return False
+    same_choices = replace(plan, track=old.track, timeline=old.timeline, library=old.library, pins=old.pins) == old
+    return same_choices and np.array_equal(plan.track.times[[0, -1]], old.track.times[[0, -1]])
+
+
+def _edited(
+    library: Library, asked: Plan, before: Take, report: Progress, *, cancelled, hurry, anew: Anew | None
+) -> Take | None:
+    """The take, or None where it has to be made as a whole; what is made anew is made in the library's size."""
+    then = resolve_plan(before.plan, library, course=before.solved)
+    same_ball = _same_ball(asked, before.plan)
+    plan = resolve_plan(asked, library, course=before.solved if same_ball else None)
+    small = taken_in_library_size(before, plan.size)
+    found = _updated(library, plan, then, small, report, cancelled=cancelled, hurry=hurry, anew=anew)
+    if found is None:
+        return None
+    take, order, hurried = found
+    return finished(take, plan, library, order, hurried=hurried, before=before)
+
+
+def _same_ball(plan: Plan, old: Plan) -> bool:
+    """Whether the ball's course is solved from the same samples."""
+    names = ("times", "positions", "ball", "ball_height_known")
+    pairs = [(getattr(plan.track, name), getattr(old.track, name)) for name in names]
+    return all(np.array_equal(new, before, equal_nan=True) for new, before in pairs)
+
+
+def _updated(
+    library: Library, plan: ResolvedPlan, then: ResolvedPlan, before: Take, report: Progress, *, cancelled, hurry,
+    anew: Anew | None,
+):
+    """The take without pins, made by `plan` where `before` was made by `then`; its order and the frame
+    from which on it was searched in a hurry; None where it has to be made as a whole."""
+    clock = [time.perf_counter()]
+    library = _library_of_both(library, (plan, then), report)
+    old, new = build_order(library, then), build_order(library, plan)
+    if not _made_from(library, before, len(old)):
+        return None
+    again = to_search(library, before.edit, old, new, SLOT)
+    if anew is not None:
+        frames = [int(round((second - before.start_time) * library.fps)) for second in (anew.start, anew.end)]
+        again = joined([*again, asked_anew(library, before.edit, new, *frames)], int(round(HAND_OVER * library.fps)))
+    used = anew.used if anew is not None else ()
+    if again == [(0, len(new))]:
+        return None
+    edit = replace(before.edit, keys=_outside(kept_keys(before.edit, old, new), new, again))
+    hurried = []
+    for number, (first, end) in enumerate(again):
+        def tell(fraction, text, number=number):
+            report(0.8 * (number + fraction) / len(again), text)
+
+        search = PathSearch(
+            library, new, balanced(plan.asked.alpha), tell, cancelled, hurry=hurry, between=Between(edit, first, end),
+            used=used,
+        )
+        edit = search.run()
+        hurried += [search.hurried] if search.hurried is not None else []
+    clock.append(time.perf_counter())
+    report(0.8, "Constructing")
+    track = new.track if plan.fps == library.fps else plan.sampled(plan.fps)
+    update = _Update(library, plan, before, track=track, edit=edit, order=new)
+    moved = np.interp(update.index, np.arange(len(new)), lies_elsewhere(old, new).astype(float)) > 0.0
+    for stretch in update.stretches(again, moved):
+        update.make(stretch)
+    clock.append(time.perf_counter())
+    report(1.0, "Done")
+    seconds = dict(zip(("search", "polish"), np.diff(clock).tolist()))
+    return replace(update.take(), seconds=seconds), new, min(hurried, default=None)
+
+
+def _library_of_both(library: Library, plans: Iterable[ResolvedPlan], report: Progress) -> Library:
+    """The library with made clips where the first plan or else the second needs them."""
+    for which in plans:
+        suited = search_library(library, which, report)
+        if len(suited.clips) > len(library.clips):
+            break
+    return suited
+
+
+def _made_from(library: Library, before: Take, count: int) -> bool:
+    """Whether the take's edit list, read in this library, shows what the take shows."""
+    edit, fps = before.edit, before.plan.fps
+    if edit is None or len(edit) != count or edit.clip.max() >= len(library.clips):
+        return False
+    what = shown(library, edit, output_index(len(before.motion), library, fps, count))
+    paths = np.array(sources_shown(library, what)) == np.array(before.clips)[before.clip]
+    return bool(np.all(paths) and np.allclose(what.clip_frame, before.clip_frame, rtol=0.0, atol=1e-6))
+
+
+def _outside(keys, order: Wanted, again: list[Stretch]):
+    """The placed keys that no stretch searches anew."""
+    frames = {key.wanted: order.keys[key.wanted].frame for key in keys}
+    return tuple(key for key in keys if not any(first <= round(frames[key.wanted]) < end for first, end in again))
+
+
+class _Update:
+    """A take in the making: the old one's arrays, with one stretch after the other made anew."""
+
+    def __init__(
+        self, library: Library, plan: ResolvedPlan, before: Take, *, track: SampledTrack, edit: EditList, order: Wanted
+    ):
+        self.library, self.plan, self.before = library, plan, before
+        self.track, self.edit, self.order = track, edit, order
+        self.index = output_index(len(track), library, plan.fps, len(edit))
+        self.shown = shown(library, edit, self.index)
+        self.root, self.rotations = before.motion.root_positions.copy(), before.motion.rotations.copy()
+        kept = before.contacts, before.correction, before.ik_miss
+        self.contacts, self.correction, self.miss = (values.copy() for values in kept)
+        none = np.zeros_like(self.contacts)
+        self.stepped = none if before.stepped is None else before.stepped.copy()
+        self.ball = track.ball.copy() if before.ball is None else before.ball.positions.copy()
+        self.anew = np.zeros(len(track), bool)
+        self.keys = key_results(library, plan.fps, order, edit, self.shown)
+        self.touches = find_touches(library, plan.fps, edit, self.keys)
+
+    def stretches(self, again: list[Stretch], moved: np.ndarray) -> list[Stretch]:
+        """Output frames (first, end) that are laid out anew: what was searched, where the track moved (T,), and the
+        frames over which seams are spread otherwise than before."""
+        touched = moved.copy()
+        old, new = (self._spread(seams) for seams in (self.before.seams, self.shown.seams))
+        spread = old ^ new
+        for first, end in again:
+            inside = (self.index > first - 1) & (self.index < end)
+            touched |= inside
+            # a seam at either end stays where it was, but what it joins is another
+            low, high = np.flatnonzero(inside)[[0, -1]]
+            spread |= {(seam, reach) for seam, reach in old | new if low <= seam <= high + 1}
+        for seam, reach in spread:
+            touched[max(0, int(np.ceil(seam - reach))) : int(np.floor(seam + reach)) + 1] = True
+        return stretches(touched, int(round((2 * HAND_OVER + 0.3) * self.plan.fps)))
+
+    def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
+        longest = 0.5 * self.plan.asked.seam_window * self.plan.fps
+        return set(zip(seams.tolist(), reaches(seams, len(self.index), longest).tolist()))
+
+    def make(self, stretch: Stretch) -> None:
+        """Makes output frames first .. end anew and hands over to the old ones around them."""
+        hand, context = (int(round(seconds * self.plan.fps)) for seconds in (HAND_OVER, HAND_OVER + CONTEXT))
+        low, high = max(0, stretch[0] - context), min(len(self.index), stretch[1] + context)
+        inner = stretch[0] - low, stretch[1] - low
+        construction = self._construction(low, high, inner, old_share(high - low, inner, hand))
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
+        made = slice(max(0, stretch[0] - hand - low), min(high, stretch[1] + hand) - low)
+        at, share = slice(made.start + low, made.stop + low), construction.old.share[made]
+        new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
+        self.root[at], self.rotations[at] = handed_over(
+            self.library.skeleton, new, old, share, taken.standing[made], self.plan.fps
+        )
+        self.ball[at] = _ball_between(ball[made], self.ball[at], share)
+        self.contacts[at], self.stepped[at] = taken.contacts[made], taken.stepped[made]
+        inside = np.arange(*stretch)
+        self.correction[inside], self.miss[inside] = planted.correction[inside - low], planted.miss[inside - low]
+        self.anew[at] = True
+
+    def _construction(self, low: int, high: int, stretch: Stretch, share: np.ndarray) -> Construction:
+        """Frames low .. high, of which those within `stretch` (counted from low) are free and the others are given by
+        the old motion; share (W,) of it in what comes out."""
+        window = slice(low, high)
+        old = OldMotion(
+            root=self.root[window], rotation=self.rotations[window, 0], stepped=self.stepped[window], share=share,
+            stretch=stretch,
+        )
+        source = fetch(self.library, self.edit, self.index[window], self.plan.fps)
+        touches = [replace(t, frame=t.frame - low) for t in self.touches if low <= round(t.frame) < high]
+        return Construction(
+            library=self.library, plan=self.plan, track=self.track.frames(low, high), source=source, touches=touches,
+            old=old,
+        )
+
+    def take(self) -> Take:
+        """The take as it now is."""
+        made = self.anew
+        mirrored = np.array([clip.mirrored for clip in self.library.clips])
+        what = self.shown
+        part = Shown(what.clip[made], what.frame[made], what.clip_frame[made], what.piece[made])
+        new, sources = iter(words_shown(self.library, part)), sources_shown(self.library, part)
+        names = tuple(dict.fromkeys((*self.before.clips, *sources)))
+        clip = np.array(self.before.clip)
+        clip[made] = [names.index(source) for source in sources]
+        return replace(
+            self.before,
+            motion=Motion(self.library.skeleton, self.root, self.rotations, self.plan.fps),
+            clips=names,
+            clip=clip,
+            clip_frame=np.where(made, self.shown.clip_frame, self.before.clip_frame),
+            mirrored=np.where(made, mirrored[self.shown.clip], self.before.mirrored),
+            words=tuple(next(new) if fresh else old for fresh, old in zip(made, self.before.words)),
+            contacts=self.contacts,
+            seams=self.shown.seams,
+            timeline=self.order.timeline,
+            keys=self._keys_as_before(),
+            ball=self._ball_path(),
+            correction=self.correction,
+            ik_miss=self.miss,
+            stepped=self.stepped,
+            plan=self.plan.asked,
+            edit=self.edit,
+        )
+
+    def _ball_path(self) -> BallPath | None:
+        if not np.isfinite(self.ball[:, :2]).any():
+            return None
+        return BallPath(self.track.times, self.ball, self.track.ball_measured)
+
+    def _keys_as_before(self) -> tuple[KeyResult, ...]:
+        """The results; of a key moment whose frame has not been touched the old one, under the line in which it is
+        asked now."""
+        out, left = [], list(self.before.keys)
+        for key in self.keys:
+            near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))
+            old = next((result for result in left if result.asked == key.asked), None)
+            if old is not None:
+                left.remove(old)
+            out.append(key if old is None or self.anew[near] else replace(old, asked=key.asked))
+        return tuple(out)
+
+
+def _ball_between(new: np.ndarray, old: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """(W, 3) m from the new path of the ball to the old one."""
+    return np.where(np.isfinite(old) & (share > 0.0)[:, None], new + share[:, None] * (old - new), new)

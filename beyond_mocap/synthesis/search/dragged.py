@@ -1,0 +1,78 @@
+"""Entries and exits of key moments' clips that stand while the track runs: what may be left out of them, and is told.
+
+Who arrives at a run does not stand before he heads a ball. Laid on his track, a clip that stands there would be pulled
+along with both feet on the ground, and no step is taken around a touch. Feet that slide give way later than seams
+(../shared/metrics.md), so the search is offered such a clip without that part too.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.errors import TimedLine
+from ...library.keys import Key
+from ...library.library import Library
+from .edit_list import EditList
+from .offer import USUAL_STANCE
+from .wanted import Wanted, needed, pool_frame
+
+DRAGGED = 1.0
+"""m/s by which a clip with both feet on the ground is slower or faster than the track, above which they are dragged."""
+
+_TOLD = 4.0  # frames left out from which on it is told
+
+
+def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, low: int, high: int) -> bool:
+    """Whether a key's clip, its key frame at output frame `at`, drags its feet for most of the frames low .. high: both
+    stand for longer than in a walk, and the track goes DRAGGED faster or slower than the clip."""
+    frames, out = library.frames, np.arange(max(low, 0), min(high, len(wanted)))
+    first = frames.first[key.clip]
+    shown = np.round(pool_frame(library, key) + rate * (out - at)).astype(int)
+    shown = np.clip(shown, first, first + frames.count[key.clip] - 1)
+    apart = np.abs(wanted.track.speed[out] - rate * frames.speed[shown])
+    feet = (library.stance_seconds[shown] > USUAL_STANCE) & (apart > DRAGGED)
+    return 2 * np.count_nonzero(feet) > len(out)
+
+
+def undragged(
+    library: Library, wanted: Wanted, edges: np.ndarray, at: float, key: Key, rate: float, slots: tuple[int, int],
+    around: float,
+) -> list[tuple[int, int]]:  # fmt: skip
+    """The slots (first, end) that a key's clip is to fill, and with them those that are left without the slots at
+    either end, one by one, that drag its feet; `around` frames on either side of `at` stay.
+
+    edges (S + 1,) output frames of all slots.
+    """
+    first, end = slots
+    a, b = first, end
+    while at - edges[a + 1] >= around and drags(library, wanted, at, key, rate, edges[a], edges[a + 1]):
+        a += 1
+    while edges[b - 1] - at >= around and drags(library, wanted, at, key, rate, edges[b - 1], edges[b]):
+        b -= 1
+    return list(dict.fromkeys([(first, end), (a, end), (first, b), (a, b)]))
+
+
+def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine]:
+    """A line for each recorded key moment whose clip is shown without some of its entry or exit that drags its feet.
+    edit: at the library's rate."""
+    told = []
+    for placed in edit.keys:
+        if placed.key.clip < len(library.clips):
+            told += _left_out_of(library, wanted, edit, placed.key, wanted.keys[placed.wanted])
+    return told
+
+
+def _left_out_of(library: Library, wanted: Wanted, edit: EditList, key: Key, asked) -> list[TimedLine]:
+    at = int(np.clip(round(asked.frame), 0, len(edit) - 1))
+    low, high = next(piece for piece in edit.pieces if piece[0] <= at < piece[1])
+    entry, leave = needed(library, key)
+    rate = (edit.frame[high - 1] - edit.frame[low]) / max(high - 1 - low, 1)
+    whole = round(asked.frame - entry / rate), round(asked.frame + leave / rate)
+    start, words = float(wanted.track.times[0]), " ".join(asked.asked.words)
+    told = []
+    for name, first, end, inside in (("entry", whole[0], low, low > 0), ("exit", high, whole[1], high < len(edit))):
+        if inside and end - first >= _TOLD and drags(library, wanted, asked.frame, key, rate, first, end):
+            when = start + first / library.fps, start + end / library.fps
+            lacks = f"the {name} of the clip for '{words}' is left out, since it stands while the track does not"
+            told.append(TimedLine(f"{when[0]:.1f}-{when[1]:.1f} s: {lacks}", when))
+    return told

@@ -1,0 +1,116 @@
+"""Which of several clips that carry the asked words fits a key moment best: where, how high and which way it strikes.
+
+All is compared in the frame of travel: x along the player's way at the key moment, y to his left. Speed and turning are
+weighed by the search itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...annotation.ball_contact import surfaces
+from ...library.keys import Key
+from ...library.library import Library
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from ...motion.motion import at_frames, pose_kinematics
+from ...annotation.striking import faster_middle
+from ...motion.track import SampledTrack
+from .wanted import pool_frame
+
+HEIGHT_COST = 0.8
+PLACE_COST = 0.3
+ANGLE_COST = 0.2
+_NOISE = 0.15  # m by which a tracked ball may be off without saying anything about the clip
+_FARTHEST = 1.0
+_FAST_BALL, _FAST_PART = 3.0, 1.5
+_MOMENT = 1.0 / 60.0
+_LEAVING = (0.06, 0.3)
+
+
+@dataclass(frozen=True, eq=False)
+class Ball:
+    """What the track says about the ball at a key moment, in the frame of travel: place (2,) m from the player; height
+    m, NaN where it is not measured; leaving (2,) m/s just after. NaN throughout where there is no ball."""
+
+    place: np.ndarray
+    height: float
+    leaving: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Strikes:
+    """How K key moments of clips strike: place (K, 2) m of the part's middle from the hips, height (K,) m, velocity
+    (K, 2) m/s, in the frame of travel; NaN for what touches no ball."""
+
+    place: np.ndarray
+    height: np.ndarray
+    velocity: np.ndarray
+
+
+def ball_at(track: SampledTrack, frame: float, height_known: bool) -> Ball:
+    """The ball of a sampled track at a fractional frame."""
+    def at(second: float) -> np.ndarray:
+        where = np.clip(frame + second * track.fps, 0, len(track.times) - 1)
+        return np.array([np.interp(where, np.arange(len(track.times)), column) for column in track.ball.T])
+
+    here = int(np.clip(round(frame), 0, len(track.times) - 1))
+    back = -float(track.direction[here])
+    ball = at(0.0)
+    leaving = (at(_LEAVING[1]) - at(_LEAVING[0]))[:2] / (_LEAVING[1] - _LEAVING[0])
+    place = quaternion.turned_level(ball[None, :2] - track.positions[here], np.array([back]))[0]
+    height = float(ball[2]) if height_known else np.nan
+    return Ball(place, height, quaternion.turned_level(leaving[None], np.array([back]))[0])
+
+
+def strikes(library: Library, keys: Sequence[Key]) -> Strikes:
+    """Traits of clips' key moments; of two parts that may strike, the faster one's."""
+    roots, poses = zip(*(_around(library, key) for key in keys))
+    places, rotations = pose_kinematics(library.skeleton, np.concatenate(roots), np.concatenate(poses))
+    places, rotations = (values.reshape(len(keys), 3, *values.shape[1:]) for values in (places, rotations))
+    frame = np.array([round(pool_frame(library, key)) for key in keys])
+    back = -_travel(library, np.clip(frame, 0, len(library.frames) - 1))
+    rows = [_strike(library, key, p, r, a) for key, p, r, a in zip(keys, places, rotations, back)]
+    place, height, velocity = zip(*rows)
+    return Strikes(np.array(place), np.array(height), np.array(velocity))
+
+
+def _around(library: Library, key: Key):
+    """Root and pose a moment before, at, and a moment after a key frame."""
+    motion = library.clips[key.clip].motion
+    own = np.clip(key.frame + np.array([-1.0, 0.0, 1.0]) * _MOMENT * motion.fps, 0, len(motion) - 1)
+    return at_frames(motion, own)
+
+
+def _travel(library: Library, frame: np.ndarray) -> np.ndarray:
+    """(K,) radians in the clips' own world: the way they go at library frames (K,), or face where they stand."""
+    velocity = library.frames.velocity[frame]
+    aside = arctan2(velocity[:, 1], velocity[:, 0])
+    return library.frames.heading[frame] + np.where(np.linalg.norm(velocity, axis=1) > 0.5, aside, 0.0)
+
+
+def _strike(library: Library, key: Key, places: np.ndarray, rotations: np.ndarray, back: float):
+    """place (2,), height and velocity (2,) of the part that strikes; places (3, J, 3), rotations (3, J, 4)."""
+    found = surfaces(library.skeleton, key.words)
+    if not found:
+        return np.full(2, np.nan), np.nan, np.full(2, np.nan)
+    middle = faster_middle(found, places, rotations)
+    level = np.stack([(middle[1] - places[1, 0])[:2], (middle[2] - middle[0])[:2] / (2.0 * _MOMENT)])
+    place, velocity = quaternion.turned_level(level, np.full(2, back))
+    return place, float(middle[1, 2]), velocity
+
+
+def misfit(found: Strikes, ball: Ball) -> np.ndarray:
+    """(K,) cost of serving a key moment with that ball by each of the clips' strikes; what is not known costs
+    nothing."""
+    apart = np.linalg.norm(found.place - ball.place, axis=1)
+    cost = PLACE_COST * np.clip(apart - _NOISE, 0.0, _FARTHEST)
+    cost = np.nan_to_num(cost)
+    cost += np.nan_to_num(HEIGHT_COST * np.maximum(np.abs(found.height - ball.height) - _NOISE, 0.0))
+    turned = arctan2(*found.velocity.T[::-1]) - arctan2(ball.leaving[1], ball.leaving[0])
+    turned = np.abs(quaternion.wrapped(turned))
+    fast = (np.linalg.norm(found.velocity, axis=1) > _FAST_PART) & (np.linalg.norm(ball.leaving) > _FAST_BALL)
+    return cost + ANGLE_COST * np.where(fast, turned, 0.0)

@@ -1,0 +1,138 @@
+"""What a library offers to the path search, whatever is asked: worked out once, kept as long as the library."""
+
+from __future__ import annotations
+
+import weakref
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+from ...annotation import DISCRETE
+from ...library.library import Library
+from ...base.arctangent import arctan2
+from .annotation_cost import AnnotationCost
+
+SLOT = 8
+RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])
+BUCKET = 40
+REACH = 8
+_SPEED_CLASSES = (1.0, 2.0, 3.0, 4.5)
+USUAL_STANCE = 0.3  # s with both feet on the ground, in a walk
+_LONGEST_STANCE = 2.0
+_SHOWN = 14  # library frames that a long slot shows at the fastest rate
+
+
+@dataclass(frozen=True, eq=False)
+class Pairs:
+    """K pairs of a rate and a library frame at which a slot may begin. number (K,) of the rate; frame (K,); speed (K,)
+    m/s and turn (K,) radians over the slot; offset (K,) radians from the direction of travel to the body's; long_stance
+    (K,) s that both feet stand longer than in a walk."""
+
+    number: np.ndarray
+    frame: np.ndarray
+    speed: np.ndarray
+    turn: np.ndarray
+    offset: np.ndarray
+    long_stance: np.ndarray
+
+    def part(self, which: slice) -> "Pairs":
+        """Some of the pairs."""
+        return Pairs(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+class Offer:
+    """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
+    by_speed (K,) the valid pairs (rate, frame), flat, in the order of their speeds; offset, long_stance (N,): see
+    `Pairs`; made (N,) bool; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look
+    alike to whoever sees them twice.
+    """
+
+    _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
+
+    @classmethod
+    def of(cls, library: Library, allowed: np.ndarray) -> "Offer":
+        """The library's offer with the clips of `allowed` (C,) bool."""
+        kept = cls._kept.setdefault(library, {})
+        if allowed.tobytes() not in kept:
+            kept[allowed.tobytes()] = cls(library, allowed)
+        return kept[allowed.tobytes()]
+
+    def __init__(self, library: Library, allowed: np.ndarray):
+        """Works it all out; `of` does so only once."""
+        self.frames = library.frames
+        self.annotation = AnnotationCost(library.frames)
+        self.made = np.array([clip.made for clip in library.clips])[library.frames.clip]
+        self.bucket = (np.arange(len(library.frames)) // BUCKET).astype(int)
+        speed, turn, lasts = map(np.stack, zip(*(played_speed_and_turn(library, rate) for rate in RATES)))
+        self.speed, self.turn = speed.astype(np.float32), turn.astype(np.float32)
+        self.valid = lasts & allowed[library.frames.clip]
+        usable = np.flatnonzero(self.valid)
+        self.by_speed = usable[np.argsort(self.speed.ravel()[usable], kind="stable")]
+        self.offset = -arctan2(self.frames.velocity[:, 1], self.frames.velocity[:, 0]).astype(np.float32)
+        self.long_stance = np.clip(library.stance_seconds - USUAL_STANCE, 0.0, _LONGEST_STANCE).astype(np.float32)
+        self.stands = library.feet_standing
+        self.wild_before, self.wild_after = wildness(library)
+        self._by_words: dict[frozenset[str], tuple[np.ndarray, np.ndarray]] = {}
+        self._sorted: dict[frozenset[str], Pairs] = {}
+        self._showing: dict[frozenset[str], np.ndarray] = {}
+
+    def pairs(self, number: np.ndarray, frame: np.ndarray) -> Pairs:
+        """The pairs of RATES[number (K,)] and frame (K,)."""
+        played = self.speed[number, frame], self.turn[number, frame]
+        return Pairs(number, frame, *played, self.offset[frame], self.long_stance[frame])
+
+    def in_speed(self, avoid: frozenset[str] = frozenset()) -> Pairs:
+        """All valid pairs in the order of their speeds, none that shows a word of `avoid` unless all do."""
+        if avoid not in self._sorted:
+            fine = ~self.showing(avoid)[self.by_speed % len(self.frames)]
+            kept = self.by_speed[fine] if avoid and fine.any() else self.by_speed
+            number, frame = np.divmod(kept, len(self.frames))
+            self._sorted[avoid] = self.pairs(number.astype(np.int8), frame.astype(np.int32))
+        return self._sorted[avoid]
+
+    def showing(self, words: frozenset[str]) -> np.ndarray:
+        """(N,) bool: a slot from there on shows one of the words."""
+        if words not in self._showing:
+            carried = self.annotation.showing(words)
+            self._showing[words] = maximum_filter1d(carried, _SHOWN, origin=-(_SHOWN // 2), mode="nearest")
+        return self._showing[words]
+
+    def lacking(self, words: frozenset[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Where `words` are asked (none: all will do): (N,) share of them that each frame lacks; (N,) bool: a slot from
+        there on shows an action (a kick, a jump) that nobody asked for, or nothing that is annotated."""
+        if words not in self._by_words:
+            names, frames = self.frames.vocabulary, self.frames
+            missing = self.annotation.missing_share(words) if words else np.zeros(len(frames))
+            actions = [i for i, word in enumerate(names) if word in DISCRETE and word not in words]
+            acts = maximum_filter1d(frames.words[:, actions].any(axis=1), SLOT + 1, origin=-(SLOT // 2), mode="nearest")
+            self._by_words[words] = missing.astype(np.float32), acts | ~frames.words.any(axis=1)
+        return self._by_words[words]
+
+
+def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
+    """(N,) and (N,): by how much the largest jerk within REACH frames before and after each frame exceeds what is usual
+    at its speed, as a share; 0 where it does not. A seam's jerk is measured over such windows
+    (../shared/metrics.md)."""
+    frames = library.frames
+    kind = np.digitize(frames.speed, _SPEED_CLASSES)
+    around = maximum_filter1d(frames.jerk, 2 * REACH + 1, mode="nearest")
+    usual = np.array([np.percentile(around[kind == k], 90) if np.any(kind == k) else np.inf for k in range(5)])
+    windows = (maximum_filter1d(frames.jerk, REACH + 1, mode="nearest", origin=o * (REACH // 2)) for o in (1, -1))
+    return tuple(np.maximum(window / usual[kind] - 1.0, 0.0).astype(np.float32) for window in windows)
+
+
+def played_speed_and_turn(library: Library, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Per library frame, if a slot starts there at `rate`: (N,) mean speed in m/s, (N,) turn of the body in radians,
+    (N,) whether the clip lasts that long."""
+    frames = library.frames
+    after = np.arange(len(frames)) + SLOT * rate
+    valid = frames.left_in_clip >= SLOT * rate
+    low = np.minimum(np.floor(after).astype(int), len(frames) - 2)
+    weight = after - low
+    weight[~valid] = 0.0
+    low[~valid] = np.minimum(np.arange(len(frames))[~valid], len(frames) - 2)
+    path = frames.path[low] * (1 - weight)[:, None] + frames.path[low + 1] * weight[:, None]
+    heading = frames.heading[low] * (1 - weight) + frames.heading[low + 1] * weight
+    speed = np.linalg.norm(path - frames.path, axis=1) * library.fps / SLOT
+    return speed, heading - frames.heading, valid

@@ -1,0 +1,304 @@
+"""A search that looks at speed, turning, facing and words together with continuity, over the whole track.
+
+Faustino searches for words first and repairs distance afterwards; his §6.1 and §6.2 wish for position, distance and
+orientation inside the main search. Here every slot of about eight frames offers every frame of the library at five
+rates; its cost is how far speed, turn, facing and words are from what the track asks, plus what the change of pose
+costs. A beam keeps the best states of every slot. Whoever begins a piece of a key moment is bound to it as long as that
+clip's own entry and exit ask; the slot of the key frame itself is open to nobody else, so the beam has to pass through
+one of these clips at exactly the asked time, and begins its run-up as early as it must.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ...base.errors import Cancelled, InputError
+from ...library.library import Library
+from .cheapest_way import Offered, Ways
+from .edit_list import EditList, PlacedKey, find_seams, replaced
+from .key_fit import ball_at, misfit, strikes
+from .offer import RATES, SLOT
+from .path_costs import Alike, PathCosts, Weights
+from .slots import key_pieces, slot_edges, slot_of
+from .style import weak_foot_cost
+from .used import Used
+from .wanted import Wanted
+
+MEMORY_SLOTS = 15
+_LEAD_IN = 2
+
+
+@dataclass(frozen=True)
+class Width:
+    """How much a search looks at: `beam` states are kept of every slot; `candidates` pairs of library frame and rate
+    are weighed against them, the cheapest of the `looked_at` pairs nearest to the asked speed."""
+
+    beam: int = 64
+    candidates: int = 1500
+    looked_at: int = 30000
+
+
+NARROW = Width(beam=4, candidates=100, looked_at=2000)
+"""What is left when somebody waits for the end."""
+
+
+@dataclass(frozen=True, eq=False)
+class Between:
+    """A stretch to be searched anew, frames first .. end of `edit` at the library's rate. What `edit` shows before and
+    behind stays: the search sets out from the one and pays for the way to the other."""
+
+    edit: EditList
+    first: int
+    end: int
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """B ways to fill a slot: clip (B,), start (B,) library frame, rate (B,), cost (B,) of the best way here, back (B,)
+    state of the slot before, piece (B,) of a key moment or -1, recent (B, M) buckets shown lately."""
+
+    clip: np.ndarray
+    start: np.ndarray
+    rate: np.ndarray
+    cost: np.ndarray
+    back: np.ndarray
+    piece: np.ndarray
+    recent: np.ndarray
+
+    def only(self, which: np.ndarray) -> "States":
+        """The states `which`, by index."""
+        return States(*(getattr(self, field.name)[which] for field in fields(self)))
+
+
+class PathSearch:
+    """One search; `run()` gives the edit list.
+
+    between: search this stretch only and keep the rest. used: footage to do without where that can be. alike: another
+    measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
+    hurry: when it says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None;
+    before the first slot is filled it ends the search as `cancelled` does. narrow: the beam is narrow from the second
+    slot on.
+    """
+
+    def __init__(
+        self,
+        library: Library,
+        wanted: Wanted,
+        weights: Weights = Weights(),
+        progress: Callable[[float, str], None] | None = None,
+        cancelled: Callable[[], bool] | None = None,
+        *,
+        hurry: Callable[[], bool] | None = None,
+        between: Between | None = None,
+        used: tuple[Used, ...] = (),
+        alike: Alike | None = None,
+        on_grid: bool = False,
+        narrow: bool = False,
+    ):
+        self.library, self.wanted, self.weights, self.between = library, wanted, weights, between
+        self.frames = library.frames
+        self.costs = PathCosts(library, wanted, weights, used, alike)
+        self.offer = self.costs.offer
+        self.edges = slot_edges(library, wanted, *((between.first, between.end) if between else (0, None)), on_grid)
+        self.pieces = key_pieces(library, wanted, self.edges)
+        self.choice_cost = self._choice_costs()
+        self._closed = {slot_of(self.edges, wanted.keys[number].frame) for number in self.pieces.wanted}
+        self.width, self.hurried = Width(), None
+        self._report = progress or (lambda fraction, text: None)
+        self._cancelled = cancelled or (lambda: False)
+        self._hurry, self._narrow = hurry or (lambda: False), narrow
+
+    def run(self) -> EditList:
+        """The cheapest way through all slots that the beam finds; InputError where no clip is as long as a slot."""
+        if not len(self.offer.by_speed):
+            raise InputError(
+                self.library.folder or "library",
+                f"no clip of more than {SLOT} frames at {self.library.fps:g} per second",
+                "clips of a second or more", "add longer recordings",
+            )
+        layers: list[States] = []
+        count = len(self.edges) - 1
+        before, shown = self._arriving() if self.edges[0] > 0 else (None, 0)
+        for slot in range(count):
+            self._stop_or_hurry(slot)
+            self._report(slot / count, "Searching")
+            before = self._first() if before is None else self._layer(slot, before, shown)
+            shown = self.edges[slot + 1] - self.edges[slot]
+            layers.append(before)
+        if self.edges[-1] < len(self.wanted):
+            layers[-1] = self._leaving(layers[-1], shown)
+        return self._read(layers)
+
+    def _stop_or_hurry(self, slot: int) -> None:
+        if self._cancelled() or slot == 0 and self._hurry():
+            raise Cancelled("synthesis: cancelled")
+        if self.hurried is None and (self._hurry() or self._narrow and slot > 0):
+            self.width, self.hurried = NARROW, int(self.edges[slot])
+
+    def _choice_costs(self) -> np.ndarray:
+        """(P,) how badly each piece's clip strikes the ball that the track has at its key moment."""
+        costs = np.zeros(len(self.pieces.wanted))
+        for number in np.unique(self.pieces.wanted):
+            key, at = self.wanted.keys[number], self.pieces.wanted == number
+            ball = ball_at(self.wanted.track, key.frame, key.ball_height_known)
+            costs[at] = misfit(strikes(self.library, key.choices), ball)[self.pieces.choice[at]]
+            costs[at] += weak_foot_cost(key.asked.words, key.choices, self.wanted.weak_foot)[self.pieces.choice[at]]
+        return costs
+
+    def _first(self) -> States:
+        to = self.offered(0)
+        recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
+        return self._kept(States(to.clip, to.start, to.rate, to.cost, np.zeros(len(to.clip), int), to.piece, recent))
+
+    def _arriving(self) -> tuple[States, int]:
+        """The one state from which a stretch sets out, the frame before, with what was shown up to there; and its
+        length."""
+        first, edit = self.between.first, self.between.edit
+        at = np.array([first - 1])
+        shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
+        recent = self.offer.bucket[self.costs.inside(shown)][None, :]
+        nothing = np.zeros(1, int)
+        return States(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), nothing, nothing - 1, recent), 1
+
+    def _leaving(self, states: States, shown: int) -> States:
+        """The last states, of `shown` frames, with what it costs to come to the frame that stays behind the stretch."""
+        edit, at = self.between.edit, np.array([self.between.end])
+        goal = Offered(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), np.array([-1]))
+        ways = self.ways(states, np.arange(len(states.cost)), states.start + states.rate * shown)
+        return replace(states, cost=ways.every(goal)[:, 0])
+
+    def _layer(self, slot: int, before: States, shown: int) -> States:
+        """The best states of one slot, given those of the slot before, of `shown` frames."""
+        ends = before.start + before.rate * shown
+        bound = (before.piece >= 0) & (np.append(self.pieces.end, 0)[before.piece] > slot)
+        options = [self._bound(slot, before, ends, np.flatnonzero(bound))] if bound.any() else []
+        free = np.flatnonzero(~bound)
+        if len(free):
+            going_on = [] if slot in self._closed else [self._continued(slot, before, ends, free)]
+            known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
+            options += [self._entered(slot, before, ends, free, known), *going_on]
+        clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
+        return self._kept(States(clip, start, rate, cost, back, piece, np.roll(before.recent[back], -1, axis=1)))
+
+    def _kept(self, states: States) -> States:
+        """The cheapest of those that are free and of those bound to a key moment, as many of each as the beam keeps,
+        with their memory moved on."""
+        order = np.argsort(states.cost, kind="stable")
+        free = states.piece[order] < 0
+        kept = states.only(np.concatenate([order[free][: self.width.beam], order[~free][: self.width.beam]]))
+        kept.recent[:, -1] = self.offer.bucket[self.costs.inside(kept.start)]
+        return kept
+
+    def offered(self, slot: int) -> Offered:
+        """What can begin in a slot: pieces of key moments, and, unless a key frame lies in it, library frames at any
+        rate: the cheapest candidates, those that lead into a piece, and what was shown before an edit."""
+        low, high = self.edges[slot : slot + 2]
+        closed, here = slot in self._closed, np.flatnonzero(self.pieces.first == slot)
+        offers = [self._beginning(low, high, here)] if closed or len(here) else []
+        if not closed:
+            offers += [self._candidates(low, high), *self._leading_in(slot)]
+            offers += [self._as_before(low, high)] if self.between else []
+        return Offered(*(np.concatenate(parts) for parts in zip(*offers)))
+
+    def _beginning(self, low: int, high: int, here: np.ndarray):
+        """Pieces `here` of key moments."""
+        clip, start, rate = self.pieces.clip[here], self.pieces.start[here], self.pieces.rate[here]
+        cost = self.costs.key_misfit(low, high, clip, start, rate) + self.choice_cost[here]
+        return clip, start, rate, cost, here
+
+    def _candidates(self, low: int, high: int):
+        number, start, cost = self.costs.cheapest(low, high, self.width.looked_at, self.width.candidates)
+        return self.frames.clip[start], start.astype(float), RATES[number], cost, np.full(len(cost), -1)
+
+    def _leading_in(self, slot: int):
+        """Frames from which a piece that begins soon is reached without a cut: one offer of them all, or none."""
+        soon = np.flatnonzero((self.pieces.first > slot) & (self.pieces.first <= slot + _LEAD_IN))
+        if not len(soon):
+            return
+        number = np.abs(RATES - self.pieces.rate[soon][:, None]).argmin(axis=1)
+        clip, rate = self.pieces.clip[soon], RATES[number]
+        start = self.pieces.start[soon] - rate * (self.edges[self.pieces.first[soon]] - self.edges[slot])
+        cost = self._misfit_inside(slot, clip, start, number)
+        yield clip, start, rate, cost, np.full(len(soon), -1)
+
+    def _as_before(self, low: int, high: int):
+        """What the edit list shows in a slot of a stretch that is searched anew, so that the search may come back to
+        it; nothing where it is cut there."""
+        edit = self.between.edit
+        at = np.array([] if np.any((edit.seams > low) & (edit.seams < high)) else [low], int)
+        start, rate = edit.frame[at], _steps(edit, at)
+        number = np.abs(RATES - rate[:, None]).argmin(axis=1)
+        cost = self.costs.misfit(low, high, number, self.costs.inside(start))
+        return edit.clip[at], start, rate, cost, np.full(len(at), -1)
+
+    def _misfit_inside(self, slot: int, clip: np.ndarray, start: np.ndarray, number: np.ndarray) -> np.ndarray:
+        """(K,) misfit of going through clips from fractional frames on, inf where they do not last."""
+        low, high = self.edges[slot : slot + 2]
+        first, last = self.frames.first[clip], self.frames.first[clip] + self.frames.count[clip] - 1
+        lasts = (start >= first) & (start + RATES[number] * (high - low) <= last)
+        return np.where(lasts, self.costs.misfit(low, high, number, self.costs.inside(start)), np.inf)
+
+    def _entered(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray, known: np.ndarray):
+        """Whatever is offered and may be kept beside ways of `known` (L,) costs, each by the cheapest way."""
+        to = self.offered(slot)
+        which, cost, state = self.ways(before, free, ends[free]).cheapest(to, known, self.width.beam)
+        return to.clip[which], to.start[which], to.rate[which], cost, free[state], to.piece[which]
+
+    def ways(self, before: States, free: np.ndarray, ends: np.ndarray) -> Ways:
+        """The ways on from the states `free` (B,), which end at library frames `ends` (B,)."""
+        seen = self._seen(before.recent[free])
+        return Ways(self.costs, before.clip[free], ends, before.rate[free], before.cost[free], seen)
+
+    def _seen(self, recent: np.ndarray) -> np.ndarray:
+        """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
+        seen = np.zeros((len(recent), self.offer.bucket[-1] + 3), bool)
+        row = np.arange(len(recent))[:, None]
+        for shift in (0, 1, 2):
+            seen[row, np.maximum(recent + shift, 0)] = True
+        return seen[:, 1:-1]
+
+    def _bound(self, slot: int, before: States, ends: np.ndarray, bound: np.ndarray):
+        """Pieces of key moments that go on."""
+        clip, start, rate = before.clip[bound], ends[bound], before.rate[bound]
+        cost = before.cost[bound] + self.costs.key_misfit(*self.edges[slot : slot + 2], clip, start, rate)
+        return clip, start, rate, cost, bound, before.piece[bound]
+
+    def _continued(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
+        """Going on without a cut, at each rate; a slot a little longer than SLOT must still end inside the clip."""
+        back = np.repeat(free, len(RATES))
+        number = np.tile(np.arange(len(RATES)), len(free))
+        clip, start, rate = before.clip[back], ends[back], RATES[number]
+        cost = before.cost[back] + self._misfit_inside(slot, clip, start, number)
+        cost += self.weights.rate_change * np.abs(rate - before.rate[back])
+        return clip, start, rate, cost, back, np.full(len(back), -1)
+
+    def _read(self, layers: list[States]) -> EditList:
+        """Follows the cheapest last state back to the first."""
+        state = int(np.argmin(layers[-1].cost))
+        clip, frame = np.empty(len(self.wanted), int), np.empty(len(self.wanted))
+        placed: dict[int, PlacedKey] = {}
+        for slot, states in reversed(list(enumerate(layers))):
+            low, high = self.edges[slot : slot + 2]
+            frame[low:high] = states.start[state] + states.rate[state] * np.arange(high - low)
+            clip[low:high] = states.clip[state]
+            piece = int(states.piece[state])
+            if piece >= 0:
+                number = int(self.pieces.wanted[piece])
+                placed[number] = PlacedKey(number, self.pieces.key(self.wanted, piece))
+            state = int(states.back[state])
+        keys = tuple(placed[number] for number in sorted(placed))
+        if self.between:
+            return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip, frame, keys)
+        return EditList(clip, frame, find_seams(clip, frame), keys)
+
+
+def _steps(edit: EditList, at: np.ndarray) -> np.ndarray:
+    """(K,) library frames that an edit list goes on by at its frames `at` (K,), as played within their pieces."""
+    starts = np.array([low for low, _ in edit.pieces])
+    piece = np.searchsorted(starts, at, side="right") - 1
+    low, high = starts[piece], np.append(starts[1:], len(edit))[piece]
+    one = np.clip(at, low, np.maximum(high - 2, low))
+    return np.where(high - low > 1, edit.frame[np.minimum(one + 1, len(edit) - 1)] - edit.frame[one], 1.0)

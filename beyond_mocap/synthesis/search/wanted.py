@@ -1,0 +1,185 @@
+"""The order in frames of the library's rate: what is asked of every frame, and which clips can serve each key
+moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...annotation import (
+    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill,
+    gait_thresholds, spoken, words_per_frame,
+)
+from ...base.errors import NotInLibrary, TimedLine, told_time
+from ...library.automatic import automatic_words
+from ...library.keys import Key, nearest_serving, nearest_words, serving, standing_in
+from ...library.library import Library
+from ...motion.track import SampledTrack
+from ..resolved_plan import ResolvedPlan
+from .style import off_style_cost
+from .variety import Taste, taste
+
+PAPERS_OMEGA = 4.0
+
+Words = frozenset[str] | None
+
+
+@dataclass(frozen=True)
+class WantedKey:
+    """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may
+    serve it (empty: locomotion stands in), the words used where the asked ones are lacking, whether the feed measured
+    the ball's height then, and the rates at which its clip may be played (none: `slots.KEY_RATES`)."""
+
+    asked: KeyMoment
+    frame: float
+    choices: tuple[Key, ...]
+    used_instead: tuple[str, ...] | None
+    ball_height_known: bool = False
+    rates: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Wanted:
+    """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
+    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style:
+    (N,) float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of
+    the foot that key moments without a side rather leave, or "". taste: at which times this player rather shows which
+    frames, None where that is all the same. gait: per frame index into the library's gaits.
+    timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is
+    asked."""
+
+    track: SampledTrack
+    asked: tuple[Words, ...]
+    gait: np.ndarray
+    timeline: Timeline
+    keys: tuple[WantedKey, ...]
+    allowed: np.ndarray
+    warnings: tuple[str, ...]
+    avoided: tuple[frozenset[str], ...] = ()
+    off_style: np.ndarray | None = None
+    weak_foot: str = ""
+    taste: Taste | None = None
+
+    def __len__(self) -> int:
+        return len(self.track.times)
+
+    def avoided_in(self, first: int, end: int) -> frozenset[str]:
+        """All words that are avoided in any of the frames first .. end."""
+        return frozenset().union(*self.avoided[max(first, 0) : end])
+
+
+def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
+    """Put a plan into frames. Raises NotInLibrary for a key moment whose words no clip carries (unless asked to go on
+    with the nearest)."""
+    asked_for = plan.asked
+    track = plan.sampled(library.fps)
+    gaits = library.gaits
+    speeds = np.array([gait.speed for gait in gaits])
+    labelled = plan.method == "path" and not asked_for.omega
+    thresholds = library.gait_thresholds if labelled else gait_thresholds(speeds, asked_for.omega or PAPERS_OMEGA)
+    gait = automatic_gaits(track.speed, library.fps, speeds, thresholds)
+    avoided = avoided_per_frame(plan.timeline, track.times)
+    gait = _other_gaits(library, gait, track.speed, avoided)
+    automatic = automatic_words(library, gait, track)
+    automatic = [tuple(word for word in words if word not in avoid) for words, avoid in zip(automatic, avoided)]
+    timeline = fill(plan.timeline, track.times, automatic)
+    allowed = np.array([asked_for.mirror or not clip.mirrored for clip in library.clips])
+    warnings: list[str] = []
+    keys = tuple(_key(library, moment, track, gait, allowed, asked_for.nearest, warnings) for moment in timeline.keys)
+    known = plan.track.ball_height_known
+    nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.in_force))) for key in keys]
+    keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
+    asked = _with_transitions(words_per_frame(timeline, track.times), keys, library)
+    warnings += _lacking(library, plan.timeline)
+    avoided = tuple(avoided) if any(avoided) else ()
+    off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
+    weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
+    own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
+    preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
+
+
+def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:
+    """The gaits (T,) with the one nearest to the `speed` (T,) m/s in place of one whose word is avoided, where there is
+    one; near by ratio, since who walks may rather jog than stand."""
+    out = gait.copy()
+    for frame in [frame for frame, avoid in enumerate(avoided) if library.gaits[gait[frame]].word in avoid]:
+        others = [n for n, other in enumerate(library.gaits) if other.word not in avoided[frame]]
+        away = [
+            abs(np.log((library.gaits[n].speed + STANDING_SPEED) / (speed[frame] + STANDING_SPEED))) for n in others
+        ]
+        out[frame] = others[int(np.argmin(away))] if others else gait[frame]
+    return out
+
+
+def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings: list[str]) -> WantedKey:
+    frame = float(np.clip((moment.in_force - track.times[0]) * library.fps, 0, len(track.times) - 1))
+    usable = tuple(key for key in library.keys if allowed[key.clip] and not library.clips[key.clip].made)
+    made = tuple(key for key in library.keys if allowed[key.clip] and library.clips[key.clip].made)
+    if moment.avoid:
+        usable, made = _without(moment, usable, made, warnings)
+    choices = serving(usable, moment.words)
+    if choices:
+        return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), None)
+    offered = nearest_words(usable, moment.words)
+    line = f"line {moment.line}, " if moment.line else ""
+    lacks = f"the library has no clip for '{' '.join(moment.words)}'"
+    text = f"{line}{told_time(moment.time)} s: {lacks}; nearest: {_listed(offered)}"
+    if not go_on:
+        way_out = "add such a clip, or go on with the nearest (--nearest, in Blender Nearest Words)"
+        raise NotInLibrary(f"{text}; ask for one of these, {way_out}", offered)
+    choices = nearest_serving(usable, moment.words)
+    gait_words = library.gaits[int(gait[int(round(frame))])].words
+    used = spoken(choices[0].words) if choices else gait_words
+    instead = " ".join(used) if choices else "locomotion goes on there"
+    warnings.append(TimedLine(f"{text}; used instead: {instead}", (moment.time, moment.time)))
+    return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), used)
+
+
+def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], warnings: list[str]):
+    """Of recorded and made keys those that carry none of the words which the moment avoids; all of them, and a warning,
+    where no recorded one would be left that carries its words."""
+    kept = tuple(tuple(key for key in keys if not key.words.intersection(moment.avoid)) for keys in (usable, made))
+    if serving(usable, moment.words) and not serving(kept[0], moment.words):
+        avoided = " ".join(MUST_NOT + word for word in moment.avoid)
+        lacks = f"no clip for '{' '.join(moment.words)}' is {avoided}"
+        text = f"{told_time(moment.time)} s: {lacks}: one is shown all the same"
+        warnings.append(TimedLine(text, (moment.time, moment.time)))
+        return usable, made
+    return kept
+
+
+def _listed(offered: tuple[str, ...]) -> str:
+    return " | ".join(offered) if offered else "no key moment at all"
+
+
+def _lacking(library: Library, timeline: Timeline) -> list[str]:
+    """One warning per word of a span that no clip carries."""
+    asked = {word for span in timeline.spans for word in span.words} - {TRANSITION}
+    lacking = sorted(asked - library.words)
+    return [f"no clip carries the word '{word}': spans that ask for it follow the rest" for word in lacking]
+
+
+def _with_transitions(asked: list[Words], keys: tuple[WantedKey, ...], library: Library) -> list[Words]:
+    """Around each key moment only continuity counts, for as long as the clips that may serve it need (Faustino §3.2.2,
+    where elements of the annotation vector are zero in transitions); with several clips, the mean of their needs."""
+    asked = list(asked)
+    for key in keys:
+        if key.choices:
+            entry, leave = np.mean([needed(library, choice) for choice in key.choices], axis=0)
+            low = max(0, int(np.ceil(key.frame - entry)))
+            for frame in range(low, min(len(asked), int(key.frame + leave) + 1)):
+                asked[frame] = None
+    return asked
+
+
+def needed(library: Library, key: Key) -> tuple[float, float]:
+    """Frames at the library's rate that a key's clip needs before and after its key frame."""
+    rate = library.fps / library.clips[key.clip].motion.fps
+    return (key.frame - key.start) * rate, (key.end - key.frame) * rate
+
+
+def pool_frame(library: Library, key: Key) -> float:
+    """A key's place among the library's frames (fractional)."""
+    return float(library.frames.first[key.clip] + key.frame * library.fps / library.clips[key.clip].motion.fps)

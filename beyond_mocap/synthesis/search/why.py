@@ -1,0 +1,286 @@
+"""Why this clip: what each piece of an edit list cost the search that chose it, by name, and what else was near.
+
+    for reason in explain_choices(library, resolve_plan(take.plan, library), take.edit): print(reason.costs)
+
+The costs are the search's own functions, asked again for what it chose: where every seam lies on one of its slots'
+edges (always, unless the edit list was edited) all parts of all pieces add up to what it paid. Of Faustino's block
+searches the two parts of eq. 13 are told, weighed over the blocks of eight frames as they are shown.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...library.library import Library
+from .annotation_cost import AnnotationCost
+from .balance import balanced
+from .cheapest_way import Offered
+from .edit_list import EditList
+from .offer import RATES, SLOT
+from .path_costs import Term, Weights
+from .path_search import MEMORY_SLOTS, PathSearch, States
+from ..resolved_plan import ResolvedPlan
+from ..search_library import search_library
+from .slots import Pieces, slot_edges
+from .transition_cost import distances, typical_distance, windows
+from .wanted import Wanted, build_order
+
+PARTS = {
+    "speed": "speed other than the track's",
+    "turn": "turning other than the track's",
+    "facing": "facing elsewhere than wanted",
+    "words": "asked words that the clip lacks",
+    "unasked": "an action that nobody asked for, or no words at all",
+    "made": "made clip, not recorded",
+    "rate": "played faster or slower than recorded",
+    "strike": "strikes the ball otherwise than it comes",
+    "pose": "change of pose at the cut",
+    "feet": "standing feet that jump at the cut",
+    "left": "wild motion left at the cut",
+    "cut": "the cut itself, and wild motion entered",
+    "replay": "shown a moment ago",
+    "rate_change": "change of playing speed",
+    "avoided": "a word that must not be",
+    "style": "no clip of the style",
+    "variety": "out of step with this player's own lag",
+}
+"""Name of a part of the costs -> what it is about."""
+
+NEAREST = 3
+_SHIFTED = 2.0  # library frames: a key moment's piece is moved by less than this to be on time
+
+
+@dataclass(frozen=True)
+class Other:
+    """What might have been shown instead: path and mirrored of the clip, and what its best slot there would have cost
+    more than the chosen one, in all (a negative one was cheaper just there, and dearer behind)."""
+
+    path: str
+    mirrored: bool
+    more: float
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One uncut piece. first, end: frames at the library's rate. clip: index in the library. path, mirrored; shown:
+    first and last frame in the clip's own rate; rate: played / recorded speed. costs: part -> what it cost over the
+    piece; seam: the same for the cut that begins it; both in the search's own unit, about a metre per second of missed
+    speed over a slot. others: the nearest other clips for its first slot, the cheapest first."""
+
+    first: int
+    end: int
+    clip: int
+    path: str
+    mirrored: bool
+    shown: tuple[float, float]
+    rate: float
+    costs: dict[str, float]
+    seam: dict[str, float]
+    others: tuple[Other, ...] = ()
+
+    @property
+    def cost(self) -> float:
+        """All parts together."""
+        return sum(self.costs.values()) + sum(self.seam.values())
+
+
+def explain_choices(library: Library, plan: ResolvedPlan, edit: EditList) -> list[Reason]:
+    """Explain each piece of an edit list by the costs of the search that chose it.
+
+    Args:
+        library: the recordings.
+        plan: what the search was asked for.
+        edit: what it chose, at the library's rate.
+    """
+    library = search_library(library, plan, edit=edit)
+    order = build_order(library, plan)
+    if plan.method == "path":
+        return reasons(library, order, edit, balanced(plan.asked.alpha))
+    return block_reasons(library, order, edit, plan.asked.alpha)
+
+
+def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, others: int = NEAREST) -> list[Reason]:
+    """Why the path search chose each piece of an edit list. weights: the search's; others: how many other clips."""
+    search = PathSearch(library, wanted, weights)
+    way = _way_of(search, edit)
+    slots = [_slot_costs(search, way, slot) for slot in range(len(way.start))]
+    found = []
+    for first, end in edit.pieces:
+        mine = [slot for slot in range(len(way.start)) if first <= way.edges[slot] < end]
+        unary, ways = zip(*(slots[slot] for slot in mine))
+        seam, *within = ways
+        costs = _summed([*unary, *within])
+        near = (
+            tuple(_others(search, way, mine[0], sum(unary[0].values()) + sum(seam.values()), others)) if others else ()
+        )
+        found.append(_reason(library, edit, first, end, costs, _summed([seam]), near))
+    return found
+
+
+def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float) -> list[Reason]:
+    """The same for `blocks` and `distance`: words (alpha times eq. 18) over what is shown, and the change of pose
+    (1 - alpha times eq. 17) at the cut."""
+    annotation, frames = AnnotationCost(library.frames), library.frames
+    size = SLOT // 2
+    weight = (1.0 - alpha) / (typical_distance(frames) * np.sqrt(size))
+    place = np.clip(np.rint(edit.frame).astype(int), 0, len(frames) - 1)
+    found = []
+    for first, end in edit.pieces:
+        blocks = [
+            annotation.of_blocks(place[at : at + 1], wanted.asked[at : min(at + SLOT, end)])[0]
+            for at in range(first, end, SLOT)
+        ]
+        seam = {}
+        if first:
+            after = windows(frames, edit.clip[first - 1 : first], place[first - 1 : first] + 1, size)
+            seam["pose"] = float(
+                weight * distances(after, windows(frames, edit.clip[[first]], place[[first]], size))[0, 0]
+            )
+        found.append(_reason(library, edit, first, end, {"words": alpha * float(np.sum(blocks))}, seam))
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    """What was chosen, slot by slot: edges (S + 1,); clip, start, rate, piece (S,), as `path_search.States` has
+    them."""
+
+    edges: np.ndarray
+    clip: np.ndarray
+    start: np.ndarray
+    rate: np.ndarray
+    piece: np.ndarray
+
+
+def _way_of(search: PathSearch, edit: EditList) -> _Way:
+    """The states of the slots, cut at seams too, read off an edit list."""
+    edges = np.union1d(slot_edges(search.library, search.wanted), edit.seams)
+    frame, piece_at = edit.frame.copy(), np.full(len(edit), -1)
+    for placed in edit.keys:
+        _put_back(search, edit, placed, frame, piece_at)
+    low = edges[:-1]
+    later = np.minimum(low + 1, edges[1:] - 1)
+    one = frame[later] - frame[low]
+    alone = later == low
+    rate = np.where(alone, 1.0, one)
+    return _Way(edges, edit.clip[low], frame[low], rate, piece_at[low])
+
+
+def _put_back(search: PathSearch, edit: EditList, placed, frame: np.ndarray, piece_at: np.ndarray) -> None:
+    """Write into frame (T,) where the search had the uncut piece that serves a key moment, before it was shifted by a
+    part of a frame to be on time, and into piece_at (T,) the number of the search's piece that serves it."""
+    pieces, wanted = search.pieces, search.wanted
+    at = int(np.clip(round(wanted.keys[placed.wanted].frame), 0, len(edit) - 1))
+    rows = [row for row in np.flatnonzero(pieces.wanted == placed.wanted) if pieces.key(wanted, row) == placed.key]
+    fits = [(row, _off(search, edit, pieces, row)) for row in rows]
+    fits = [(row, off) for row, off in fits if off is not None]
+    if not fits:
+        return
+    row, off = min(fits, key=lambda fit: abs(fit[1]))
+    low, high = next(span for span in edit.pieces if span[0] <= at < span[1])
+    frame[low:high] -= off
+    bound = slice(search.edges[pieces.first[row]], search.edges[pieces.end[row]])
+    piece_at[bound] = row
+
+
+def _off(search: PathSearch, edit: EditList, pieces: Pieces, row: int) -> float | None:
+    """Library frames by which a list's key moment lies behind a piece of the search; None where that is not shown."""
+    first, last = search.edges[pieces.first[row]], search.edges[pieces.end[row]] - 1
+    ideal = pieces.start[row] + pieces.rate[row] * (last - first)
+    off = edit.frame[first] - pieces.start[row], edit.frame[last] - ideal
+    same = edit.clip[first] == edit.clip[last] == pieces.clip[row]
+    return float(np.mean(off)) if same and max(map(abs, off)) < _SHIFTED and abs(off[1] - off[0]) < 0.1 else None
+
+
+def _slot_costs(search: PathSearch, way: _Way, slot: int) -> tuple[dict[str, float], dict[str, float]]:
+    """What a slot cost, and the way into it."""
+    return _unary(search, way, slot), _entry(search, way, slot) if slot else {}
+
+
+def _unary(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
+    low, high = way.edges[slot : slot + 2]
+    clip, start, rate, piece = (values[slot : slot + 1] for values in (way.clip, way.start, way.rate, way.piece))
+    if piece[0] < 0:
+        number = np.abs(RATES - rate[:, None]).argmin(axis=1)
+        return _named(search.costs.misfit_terms(low, high, number, search.costs.inside(start)))
+    costs = _named(search.costs.key_terms(low, high, clip, start, rate))
+    begins = slot == 0 or way.piece[slot - 1] != piece[0]
+    return {**costs, "strike": float(search.choice_cost[piece[0]])} if begins else costs
+
+
+def _entry(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
+    """What it cost to come from the slot before: nothing within a key moment's piece, a change of rate where the clip
+    goes on, else a cut."""
+    if way.piece[slot] >= 0 and way.piece[slot] == way.piece[slot - 1]:
+        return {}
+    before, ends = _state_before(search, way, slot)
+    here = way.clip[slot : slot + 1], way.start[slot : slot + 1], way.rate[slot : slot + 1]
+    change = search.weights.rate_change * abs(float(way.rate[slot] - way.rate[slot - 1]))
+    to = Offered(*here, np.zeros(1), np.array([-1]))
+    whole = float(search.ways(before, np.zeros(1, int), ends).every(to)[0, 0])
+    if whole <= change + 1e-5:
+        return {"rate_change": change}
+    costs = _named(search.costs.cut_terms(ends, here[1]))
+    return {**costs, "replay": max(0.0, whole - change - sum(costs.values())), "rate_change": change}
+
+
+def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.ndarray]:
+    """The state of the slot before with no cost so far, and the library frame (1,) at which it ends."""
+    starts = way.start[max(slot - MEMORY_SLOTS, 0) : slot]
+    recent = np.full(MEMORY_SLOTS, -1)
+    recent[MEMORY_SLOTS - len(starts) :] = search.offer.bucket[search.costs.inside(starts)]
+    one, nothing = slice(slot - 1, slot), np.zeros(1, int)
+    state = States(way.clip[one], way.start[one], way.rate[one], np.zeros(1), nothing, way.piece[one], recent[None])
+    return state, state.start + state.rate * (way.edges[slot] - way.edges[slot - 1])
+
+
+def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -> Iterator[Other]:
+    """The cheapest clips but the chosen one that the search was offered for a slot, each by its best frame; where a key
+    moment's piece begins, those that serve it too."""
+    edge = int(np.searchsorted(search.edges, way.edges[slot]))
+    if search.edges[min(edge, len(search.edges) - 1)] != way.edges[slot]:
+        return
+    to = search.offered(edge)
+    cost = to.cost
+    if slot:
+        before, ends = _state_before(search, way, slot)
+        cost = search.ways(before, np.zeros(1, int), ends).every(to)[0]
+    serves = np.append(search.pieces.wanted, -1)
+    cost = np.where(serves[to.piece] == serves[way.piece[slot]], cost, np.inf)
+    names = [(clip.path, clip.mirrored) for clip in search.library.clips]
+    known = {names[way.clip[slot]]}
+    for number in np.argsort(cost, kind="stable"):
+        name = names[to.clip[number]]
+        if not np.isfinite(cost[number]) or len(known) > count:
+            return
+        if name not in known:
+            known.add(name)
+            yield Other(*name, float(cost[number]) - paid)
+
+
+def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam, others=()) -> Reason:
+    clip = library.clips[int(edit.clip[first])]
+    own = clip.motion.fps / library.fps
+    shown = (edit.frame[[first, end - 1]] - library.frames.first[edit.clip[first]]) * own
+    rate = (edit.frame[end - 1] - edit.frame[first]) / (end - 1 - first) if end - first > 1 else 1.0
+    return Reason(
+        first, end, int(edit.clip[first]), clip.path, clip.mirrored, (float(shown[0]), float(shown[1])), float(rate),
+        costs, seam, others,
+    )  # fmt: skip
+
+
+def _named(terms: Iterator[Term]) -> dict[str, float]:
+    """The parts of one thing's cost."""
+    return {name: float(np.ravel(values)[0]) for name, values in terms}
+
+
+def _summed(parts: list[dict[str, float]]) -> dict[str, float]:
+    """Costs of the same name added, the dearest first; those of nothing left out."""
+    total: dict[str, float] = {}
+    for costs in parts:
+        for name, value in costs.items():
+            total[name] = total.get(name, 0.0) + value
+    return {name: value for name, value in sorted(total.items(), key=lambda item: -abs(item[1])) if abs(value) > 1e-6}

@@ -1,0 +1,301 @@
+"""The recipe: from a library and a plan to a take.
+
+    library = build("clips")
+    track, report = clean(read_track_csv("player.csv"))
+    take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
+
+The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`, or
+`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and laid on the track
+(`synthesis.construct`).
+"""
+
+from __future__ import annotations
+
+import time
+import weakref
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..annotation import LOCOMOTION_WORDS, avoided_per_frame
+from ..base.errors import InputError, TimedLine, told_time
+from .quality.give_way import give_way
+from .quality.played import played_from_take
+from .known_touches import untouched, with_course
+from ..library.library import Library
+from ..motion.motion import Motion, at_frames
+from ..base.runs import runs
+from .own_size import in_own_size
+from .plan import METHODS, Plan
+from ..motion.foot_plant import Planted
+from .construct.pins import look_axis, pinned
+from .construct.steps import Steps
+from .resolve_plan import resolve_plan
+from .search.balance import balanced
+from .search.blocks import BlockSearch
+from .construct.construction import Construction
+from .construct.key_moments import find_touches, key_results
+from .construct.thesis_methods import lay_out_blocks
+from .search.distance import exact_keys, straight_edit, warped_edit
+from .search.dragged import left_out
+from .search.edit_list import EditList
+from .search.footage import fetch, output_index
+from .frame_sources import provenance_fields
+from .search.locomotion import match_distance
+from .search.path_search import PathSearch
+from .resolved_plan import ResolvedPlan
+from .search_library import search_library
+from .search.used import Used
+from .search.wanted import Wanted, build_order
+from ..motion.track.ball_path import BallPath
+from .take import PinResult, Take
+
+NEAR_KEY = 1.5
+"""Seconds around a key moment in which its own words may be shown, whoever avoids them."""
+
+PIN_MISSED, GAZE_MISSED = 0.01, np.radians(5.0)
+"""Metres, and radians of a gaze, by which a pin may be missed without being told."""
+
+LOOKED_AT = 200
+_looks: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search ends in: the edit list at the library's rate, (T,) metres travelled where the method decides it,
+    and the frame from which on it was searched in a hurry, if it was."""
+
+    edit: EditList
+    travelled: np.ndarray | None = None
+    hurried: int | None = None
+
+    def travelled_at(self, index: np.ndarray) -> np.ndarray | None:
+        """(N,) metres travelled at fractional frames `index` (N,) of the edit list."""
+        return None if self.travelled is None else np.interp(index, np.arange(len(self.travelled)), self.travelled)
+
+
+def synthesize(
+    library: Library,
+    plan: Plan,
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    hurry: Callable[[], bool] | None = None,
+    used: tuple[Used, ...] = (),
+    narrow: bool = False,
+) -> Take:
+    """A player's motion for `plan` out of `library`.
+
+    progress(fraction, text) is called now and then. Raises NotInLibrary for a key moment that no clip can serve (unless
+    plan.nearest), InputError for an unknown method, Cancelled when `cancelled()` says so. When `hurry()` says so,
+    method "path" keeps what it has found, searches the rest quickly, and the take's warnings tell from which second on;
+    before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
+    do without where it can (method "path"; the others differ by their seed). narrow: whether method "path" searches
+    quickly from the start. The same library, plan and numpy give the same bits: linear algebra is held to one thread,
+    since more add up in another order.
+    """
+    if plan.method not in METHODS:
+        raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        asking = {"cancelled": cancelled, "hurry": hurry, "used": used, "narrow": narrow}
+        return _synthesize(library, plan, progress or (lambda fraction, text: None), **asking)
+
+
+def _synthesize(library: Library, asked: Plan, report: Progress, **asking) -> Take:
+    begun = time.perf_counter()
+    plan = resolve_plan(asked, library)
+    solving = {} if plan.course is None else {"solve": time.perf_counter() - begun}
+    recordings, library = library, search_library(library, plan, report)
+    begun = time.perf_counter()
+    order = build_order(library, plan)
+    found = _search(library, plan, order, lambda fraction, text: report(0.8 * fraction, text), **asking)
+    seconds = {"search": time.perf_counter() - begun}
+    take, laid = _laid_out(library, plan, order, found, report)
+    take = replace(take, seconds={**seconds, **laid, **solving})
+    return finished(take, plan, recordings, order, hurried=found.hurried)
+
+
+def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: Progress | None = None) -> Take:
+    """The take of method "path" that shows `edit`: all that `synthesize` does behind its search.
+
+    edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
+    (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
+    take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits.
+    """
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        order = build_order(library, plan)
+        take, seconds = _laid_out(library, plan, order, Found(edit), progress or (lambda fraction, text: None))
+        return finished(replace(take, seconds=seconds), plan, library, order, judged=False)
+
+
+def _laid_out(
+    library: Library, plan: ResolvedPlan, order: Wanted, found: Found, report: Progress
+) -> tuple[Take, dict[str, float]]:
+    """What was found, fetched and laid on the ground, in the library's size; and what that took, in seconds."""
+    clock = [time.perf_counter()]
+    report(0.8, "Constructing")
+    track = order.track if plan.fps == library.fps else plan.sampled(plan.fps)
+    edit = exact_keys(library, found.edit, order)
+    index = output_index(len(track.times), library, plan.fps, len(edit))
+    source = fetch(library, edit, index, plan.fps)
+    keys = key_results(library, plan.fps, order, edit, source)
+    clock.append(time.perf_counter())
+    report(0.9, "Polishing")
+    touches = find_touches(library, plan.fps, edit, keys)
+    construction = Construction(library=library, plan=plan, track=track, source=source, touches=touches)
+    planted, taken, ball = _body(construction, found.travelled_at(index))
+    motion = Motion(library.skeleton, planted.root, planted.rotations, plan.fps)
+    take = Take(
+        **provenance_fields(library, source), motion=motion, start_time=float(track.times[0]), contacts=taken.contacts,
+        timeline=order.timeline, keys=keys, ball=ball, method=plan.method, seed=plan.asked.seed,
+        correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=plan.asked, edit=edit,
+    )
+    clock.append(time.perf_counter())
+    report(1.0, "Done")
+    return take, dict(zip(("construct", "polish"), np.diff(clock).tolist()))
+
+
+def _search(
+    library: Library, plan: ResolvedPlan, order: Wanted, report: Progress, *, cancelled, hurry, used, narrow
+) -> Found:
+    if plan.method == "path":
+        more = {"hurry": hurry, "used": used, "narrow": narrow}
+        search = PathSearch(library, order, balanced(plan.asked.alpha), report, cancelled, **more)
+        return Found(search.run(), hurried=search.hurried)
+    stops = [stop for stop in (cancelled, hurry) if stop]
+    search = BlockSearch(library, order, plan.asked.alpha, report, lambda: any(stop() for stop in stops))
+    blocks = search.run()
+    if plan.method == "blocks":
+        return Found(straight_edit(search, blocks))
+    return Found(*warped_edit(search, match_distance(search, blocks, plan.asked.delta), plan.asked.catch_up))
+
+
+def _body(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps, BallPath | None]:
+    """The body, its steps and the ball; travelled: (T,) m by method "distance"."""
+    track, ball = construction.track, construction.track.ball
+    if construction.plan.method == "path":
+        planted, taken = construction.lay_out()
+        planted, ball = construction.meet_ball(planted, taken)
+    else:
+        planted, taken = lay_out_blocks(construction, travelled)
+    known = np.any(np.isfinite(ball[:, :2]))
+    return planted, taken, BallPath(track.times, ball, track.ball_measured) if known else None
+
+
+def finished(
+    take: Take, plan: ResolvedPlan, recordings: Library, order: Wanted, *, hurried: int | None = None,
+    before: Take | None = None, judged: bool = True,
+) -> Take:
+    """A take out of the library's size in the player's, with its pins, its ball and its warnings. before: the finished
+    take that it is an edit of; hurried, judged: as `with_warnings` has them."""
+    take = with_pins(in_own_size(take, plan.size, plan.asked, before), recordings)
+    begun = time.perf_counter()
+    take = with_course(take, plan)
+    if plan.course is not None:
+        take = replace(take, seconds={**take.seconds, "ball": time.perf_counter() - begun})
+    return with_warnings(take, recordings, order, hurried, more=untouched(take, plan), judged=judged)
+
+
+def with_pins(take: Take, recordings: Library) -> Take:
+    """The take with hands, feet and gaze at the pins of its plan."""
+    pins = take.plan.pins
+    if not pins:
+        return take
+    found = pinned(take.motion, take.contacts, pins, take.start_time, look_of(recordings))
+    motion = replace(take.motion, root_positions=found.root, rotations=found.rotations)
+    results = tuple(PinResult(pin, miss) for pin, miss in zip(pins, found.miss))
+    unpinned = take.motion, take.contacts
+    return replace(take, motion=motion, contacts=found.contacts, pins=results, unpinned=unpinned)
+
+
+def look_of(library: Library) -> np.ndarray:
+    """(3,) which way heads look in their own frame, on the average of the library's locomotion."""
+    if library not in _looks:
+        frames = library.frames
+        gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_WORDS]
+        going = np.flatnonzero(frames.words[:, gaits].any(axis=1) & (frames.velocity[:, 0] > 0.0))
+        some = going[:: max(1, len(going) // LOOKED_AT)] if len(going) else np.arange(min(len(frames), LOOKED_AT))
+        pairs = zip(frames.clip[some], frames.source[some])
+        poses = [at_frames(library.clips[clip].motion, np.array([frame]))[1] for clip, frame in pairs]
+        _looks[library] = look_axis(library.skeleton, np.concatenate(poses))
+    return _looks[library]
+
+
+def with_warnings(
+    take: Take, recordings: Library, order: Wanted, hurried: int | None, *, more: Sequence[str] = (),
+    judged: bool = True,
+) -> Take:
+    """The take with what has to be told about it. recordings: the library without made clips; hurried: frame at the
+    library's rate from which on the search was cut short, or None; more: lines that are told too; judged: whether what
+    gave way is told."""
+    told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
+    if take.plan.method == "path":  # the others never choose what of a clip is left out
+        told += left_out(recordings, order, take.edit)
+    if hurried is not None:
+        since = take.start_time + hurried / recordings.fps
+        told.append(TimedLine(f"{since:.1f} s: from here on the search was cut short", (since, since)))
+    told += [*_shown_all_the_same(take), *_pins_missed(take)]
+    gave_way = _gave_way(recordings, take.plan, take) if judged else ()
+    return replace(take, cut_short=hurried is not None, warnings=(*told, *gave_way))
+
+
+def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
+    """One warning per key moment that clips could serve, but not so close to another one."""
+    placed = {key.wanted for key in edit.keys}
+    return [
+        TimedLine(
+            f"{told_time(key.asked.time)} s: no room for '{' '.join(key.asked.words)}' so close to another key moment, "
+            "it is not played", (key.asked.time, key.asked.time),
+        )  # fmt: skip
+        for number, key in enumerate(order.keys)
+        if key.choices and number not in placed
+    ]
+
+
+def _shown_all_the_same(take: Take) -> list[str]:
+    """One warning per stretch and word that must not be, where no way without it was found; what key moments close by
+    ask for is not told."""
+    times = take.start_time + np.arange(len(take.words)) / take.motion.fps
+    avoided = avoided_per_frame(take.plan.timeline, times)
+    asked = [(key.asked.in_force, frozenset(key.asked.words)) for key in take.keys]
+    told = []
+    for word in sorted(frozenset().union(*avoided)):
+        shows = np.array([word in avoid and word in words for avoid, words in zip(avoided, take.words)])
+        for time, words in asked:
+            shows &= (word not in words) | (np.abs(times - time) > NEAR_KEY)
+        told += [
+            TimedLine(
+                f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it "
+                "must not be; no way without it was found", (times[first], times[end - 1]),
+            ) for first, end in runs(shows)
+        ]  # fmt: skip
+    return told
+
+
+def _pins_missed(take: Take) -> list[str]:
+    """One warning per pin that is missed by more than can be seen."""
+    told = []
+    for result in take.pins:
+        pin, when = f"{told_time(result.pin.time)} s: the pin of {result.pin.part}", (result.pin.time, result.pin.end)
+        if not np.isfinite(result.miss):
+            told.append(f"{pin} lies outside the track, or the skeleton has no such part; it counts for nothing")
+        elif result.pin.part == "gaze" and result.miss > GAZE_MISSED:
+            beyond = np.degrees(result.miss)
+            told.append(TimedLine(f"{pin} is {beyond:.0f} degrees beyond what the neck can turn", when))
+        elif result.pin.part != "gaze" and result.miss > PIN_MISSED:
+            told.append(TimedLine(f"{pin} is out of reach by {100.0 * result.miss:.0f} cm", when))
+    return told
+
+
+def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:
+    """What could not all hold, and when."""
+    played = played_from_take(take)
+    return give_way(
+        played, track=plan.track, timeline=take.timeline, library=library, ik_miss=take.ik_miss, asked=plan.timeline
+    )

@@ -1,0 +1,1 @@
+"""Parametric motion: gait, kicks, throws, gestures of synthetic performers."""

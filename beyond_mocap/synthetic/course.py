@@ -1,0 +1,136 @@
+"""A way to go, planned ahead: how fast, where to, facing where, and in step with what.
+
+`plan` turns wanted speeds, turns and directions into the moments of a `Course`; feet (`gait.footsteps`), trunk and arms
+(`gait_trunk`) all read from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import quintic_step
+from ..base.time_series import hann_smooth
+from ..base.errors import InputError
+from . import gait_tables as tables
+from .gait_tables import at_speed
+from ..motion.retargeting.neutral import Neutral
+
+# the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
+# all the time, from this speed on, metres per second
+_PAD, _RUNNERS_PAD, _RUNS = 2.5, 1.9, 2.0
+# feet are planned at this rate or a multiple of it
+_PLAN_RATE = 120.0
+
+
+@dataclass(frozen=True)
+class GaitStyle:
+    """What makes one walker differ from another, all relative to the published figures.
+
+    cadence: factor on steps per second (longer or shorter strides). bounce, arm_swing, twist (shoulders against
+    pelvis): factors. lean, head: radians added to the trunk's forward lean and the head's nod. abduct, elbow: radians
+    added to how far arms are held away and bent. width: metres added between the feet. toe_out: radians added. crouch:
+    radians added to the knees' flexion in stance. life: factor on breathing, sway and the small unevenness from stride
+    to stride."""
+
+    cadence: float = 1.0
+    bounce: float = 1.0
+    arm_swing: float = 1.0
+    twist: float = 1.0
+    lean: float = 0.0
+    head: float = 0.0
+    abduct: float = 0.0
+    elbow: float = 0.0
+    width: float = 0.0
+    toe_out: float = 0.0
+    crouch: float = 0.0
+    life: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A way planned over N moments, `pad` of them before the first and after the last frame that is asked for.
+
+    times (N,): seconds, 0 at the first frame asked for. speed (N,): m/s. gear (N,): the same for an adult's leg, which
+    is what the tables are asked with. direction (N,): travel relative to heading. heading (N,). path (N, 2): metres.
+    acceleration (N, 2): m/s^2 of the path, smoothed over a step. phase (N,): strides; the left foot lands at whole
+    numbers, the right one half a stride later. stride: every how many moments a frame is asked for."""
+
+    times: np.ndarray
+    speed: np.ndarray
+    gear: np.ndarray
+    direction: np.ndarray
+    heading: np.ndarray
+    path: np.ndarray
+    acceleration: np.ndarray
+    phase: np.ndarray
+    pad: int
+    stride: int
+
+    @property
+    def asked(self) -> slice:
+        """The moments that are frames of the result."""
+        return slice(self.pad, len(self.times) - self.pad, self.stride)
+
+
+def plan(
+    speed, duration, fps: float, neutral: Neutral, *, phase=0.0, turn_rate=0.0, direction=0.0, style=GaitStyle(), seed=0
+) -> Course:
+    """The way that `gait` goes; parameters as there."""
+    count = _count(speed, duration, fps, turn_rate, direction)
+    stride = int(np.ceil(_PLAN_RATE / fps))
+    rate = fps * stride
+    pad = int(np.ceil((_RUNNERS_PAD if np.min(speed) >= _RUNS else _PAD) * rate))
+    times = (np.arange((count - 1) * stride + 1 + 2 * pad) - pad) / rate
+    speed, turn_rate, direction = (_at(values, times, fps, count) for values in (speed, turn_rate, direction))
+    if np.any(speed < 0.0) or np.any(speed > tables.FASTEST + 1e-9) or not np.all(np.isfinite(speed)):
+        raise InputError("gait", f"speed {np.min(speed):.3g} .. {np.max(speed):.3g} m/s", "0 .. 9.5")
+    heading = _integral(turn_rate, rate, pad)
+    way = heading + direction
+    velocity = speed[:, None] * np.stack([np.cos(way), np.sin(way)], axis=-1)
+    path = np.stack([_integral(velocity[:, axis], rate, pad) for axis in range(2)], axis=-1)
+    acceleration = np.stack(
+        [hann_smooth(np.gradient(velocity[:, axis], 1.0 / rate), int(0.35 * rate)) for axis in (0, 1)], -1
+    )
+    root_scale = np.sqrt(neutral.leg / tables.LEG)
+    gear = speed / root_scale
+    frequency = stride_frequency(gear, direction, turn_rate * root_scale) / root_scale * style.cadence
+    frequency = frequency * (1.0 + 0.015 * style.life * wander(times, seed, 3.1))
+    strides = phase + _integral(frequency, rate, pad)
+    return Course(times, speed, gear, direction, heading, path, acceleration, strides, pad, stride)
+
+
+def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:
+    """Strides per second (T,) for an adult at `gear` (T,) m/s; more when going backward or sideways or turning on the
+    spot.
+    """
+    usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
+    on_the_spot = 1.0 - quintic_step(gear / 1.8)
+    return np.hypot(usual, on_the_spot * turn_rate / 1.3)
+
+
+def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
+    """A slow aimless wave (N,) of about unit size: four sines around `period` seconds with seeded phases."""
+    random = np.random.default_rng(seed)
+    rates, phases = (0.6, 0.9, 1.35, 1.9) / np.float64(period), random.uniform(0.0, 2.0 * np.pi, 4)
+    return np.sin(2.0 * np.pi * rates * times[:, None] + phases) @ np.array([0.5, 0.45, 0.35, 0.25])
+
+
+def _count(speed, duration, fps, turn_rate, direction) -> int:
+    lengths = {np.size(v) for v in (speed, turn_rate, direction) if np.ndim(v)}
+    if duration is not None:
+        lengths.add(int(round(duration * fps)) + 1)
+    if len(lengths) != 1:
+        raise InputError("gait", f"{sorted(lengths) or 'no'} frames", "one length: a duration or arrays of one size")
+    return lengths.pop()
+
+
+def _at(values, times: np.ndarray, fps: float, count: int) -> np.ndarray:
+    values = np.broadcast_to(np.asarray(values, dtype=float), (count,))
+    return np.interp(times, np.arange(count) / fps, values)
+
+
+def _integral(values: np.ndarray, rate: float, zero: int) -> np.ndarray:
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) / rate
+    return total - total[zero]

@@ -1,0 +1,247 @@
+"""Where and when feet stand, and how they travel between: planted while they stand, the heel first, the toes last.
+
+A foot's life is a row of stances. During one its sole rolls over heel, ball and toe tip without sliding (the rockers of
+Perry 1992, "Gait analysis"); between two it follows the published angles of a swinging leg, bent so that it leaves and
+lands where the stances say, with their speed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.easing import quintic_step
+from ..base.time_series import interpolate
+from . import gait_tables as tables
+from ..motion.retargeting.neutral import Neutral
+
+# beyond this pitch the ball of the foot leaves the ground and the toe tip stays
+_TOE_LIFTS = np.radians(42.0)
+# a step this long (metres, for an adult) is a full one: shorter ones roll and lift less
+_FULL_STEP = 0.55
+
+
+@dataclass(frozen=True, eq=False)
+class Footsteps:
+    """The K stances of one foot in order of time.
+
+    side: 0 left, 1 right. on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,):
+    radians. speed (K,): m/s of travel for an adult's leg, which picks the way of rolling. direction (K,): travel
+    relative to the foot, radians."""
+
+    side: int
+    on: np.ndarray
+    off: np.ndarray
+    place: np.ndarray
+    yaw: np.ndarray
+    speed: np.ndarray
+    direction: np.ndarray
+
+    def current(self, times: np.ndarray) -> np.ndarray:
+        """Index (T,) of the stance that is under way or was the last one at `times` (T,)."""
+        return np.clip(np.searchsorted(self.on, times, side="right") - 1, 0, len(self.on) - 2)
+
+    def standing(self, times: np.ndarray) -> np.ndarray:
+        """Whether the foot is on the ground at `times`: (T,) bool."""
+        return times <= self.off[self.current(times)]
+
+    def step_size(self, scale: float) -> np.ndarray:
+        """Share (K-1,) of a full step that lies between each stance and the next; turning on the spot counts too."""
+        moved = np.linalg.norm(np.diff(self.place, axis=0), axis=1) / scale
+        return quintic_step((moved + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
+
+
+@dataclass(frozen=True, eq=False)
+class FootPath:
+    """ankle (T, 3) metres, world; pitch, yaw, bend (T,) radians: sole (toes down positive), direction, toes (up
+    positive).
+    """
+
+    ankle: np.ndarray
+    pitch: np.ndarray
+    yaw: np.ndarray
+    bend: np.ndarray
+
+
+def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutral) -> FootPath:
+    """The foot at `share` (T,) of its stances `which` (T,): it rolls over heel, ball and toe tip, none of which
+    slides."""
+    sizes = steps.step_size(neutral.leg / tables.LEG)
+    before = np.concatenate([sizes[:1], sizes])[which]
+    after = np.concatenate([sizes, sizes[-1:]])[which]
+    amount = before + (after - before) * quintic_step((share - 0.2) / 0.3)
+    pitch = amount * _directed_pitch(share, steps.speed[which], steps.direction[which])
+    tip_pitch = 0.6 * np.maximum(pitch - _TOE_LIFTS, 0.0)
+    forward, up = _roll(pitch, tip_pitch, neutral, steps.side)
+    yaw = steps.yaw[which]
+    ankle = np.stack(
+        [steps.place[which, 0] + forward * np.cos(yaw), steps.place[which, 1] + forward * np.sin(yaw), up], axis=-1
+    )
+    return FootPath(ankle, pitch, yaw, np.maximum(pitch, 0.0) - tip_pitch)
+
+
+def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Forward rolls heel to toe; backward the other way round and less (T); sideways the heel hardly leaves the
+    ground."""
+    ahead, back = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
+    forward_roll = tables.stance_pitch(share, speed)
+    backward_roll = tables.stance_pitch(1.0 - share, speed)
+    return (
+        ahead * forward_roll
+        + 0.5 * back * backward_roll
+        + 0.25 * np.sin(direction) ** 2 * np.maximum(forward_roll, 0.0)
+    )
+
+
+def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
+    """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole
+    pitches.
+    """
+    ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
+    ball_up = neutral.ankle_height - drop
+    # on the ball (and, beyond, on the toe tip)
+    tip = neutral.tip
+    lifted_ahead = ball_ahead + tip * (1.0 - np.cos(tip_pitch))
+    lifted_up = ball_up + tip * np.sin(tip_pitch)
+    ahead = lifted_ahead - ball_ahead * np.cos(pitch) + drop * np.sin(pitch)
+    up = lifted_up + ball_ahead * np.sin(pitch) + drop * np.cos(pitch)
+    # on the heel
+    heel_ahead = -neutral.heel + neutral.heel * np.cos(pitch) + neutral.ankle_height * np.sin(pitch)
+    heel_up = -neutral.heel * np.sin(pitch) + neutral.ankle_height * np.cos(pitch)
+    return np.where(pitch >= 0.0, ahead, heel_ahead), np.where(pitch >= 0.0, up, heel_up)
+
+
+def travel(
+    steps: Footsteps,
+    times: np.ndarray,
+    hip: np.ndarray,
+    heading: np.ndarray,
+    neutral: Neutral,
+    thigh_shank: tuple[float, float],
+) -> FootPath:
+    """The whole way of one foot at `times` (T,), given its hip joint (T, 3) and the body's heading (T,) there.
+
+    thigh_shank: bone lengths, metres. Times have to be evenly spaced.
+    """
+    which = steps.current(times)
+    share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
+    standing = stand(steps, which, share, neutral)
+    air = times > steps.off[which]
+    if not np.any(air):
+        return standing
+    flying = _swing(steps, which[air], times, air, hip, heading, neutral, thigh_shank)
+    out = {}
+    for name in ("ankle", "pitch", "yaw", "bend"):
+        out[name] = getattr(standing, name).copy()
+        out[name][air] = getattr(flying, name)
+    return FootPath(**out)
+
+
+def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank) -> FootPath:
+    """The foot in the air at `times[air]`, after stances `which`."""
+    scale = neutral.leg / tables.LEG
+    begin, end = steps.off[which], steps.on[which + 1]
+    length = end - begin
+    share = (times[air] - begin) / length
+    leave, land = (stand(steps, w, np.full(len(w), u), neutral) for w, u in ((which, 1.0), (which + 1, 0.0)))
+    leave_speed, land_speed = _edge_speeds(steps, which, neutral)
+    speed = 0.5 * (steps.speed[which] + steps.speed[which + 1])
+    direction = steps.direction[which + 1]
+
+    def free(at, share_at):
+        """Ankle (N, 3) and pitch (N,) of the published swing, hung on the hip at seconds `at`."""
+        hip_at = interpolate(at, times, hip)
+        turned = np.interp(at, times, heading)
+        forward, up, pitch = _leg_swing(share_at, speed, direction, thigh_shank)
+        across = np.stack([forward * np.cos(turned), forward * np.sin(turned), up], axis=-1)
+        return np.concatenate([hip_at + across, pitch[:, None]], axis=-1)
+
+    now = free(times[air], share)
+    step = 0.01
+    at_leave, at_land = free(begin, np.zeros_like(share)), free(end, np.ones_like(share))
+    free_leave = (free(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:, None]
+    free_land = (at_land - free(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
+    wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
+    wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
+    full = now + _bridge(
+        share, length, wanted_leave - at_leave, wanted_land - at_land, leave_speed - free_leave, land_speed - free_land
+    )
+    size = steps.step_size(scale)[which]
+    small = _small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
+    mixed = full * size[:, None] + small * (1.0 - size[:, None])
+    yaw = leave.yaw + (land.yaw - leave.yaw) * quintic_step(share)
+    ankle = mixed[:, :3].copy()
+    ankle[:, 2] += _clearance(ankle[:, 2], mixed[:, 3], share, size, neutral)
+    return FootPath(ankle, mixed[:, 3], yaw, leave.bend * (1.0 - quintic_step(share / 0.3)))
+
+
+def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
+    """Speed (N, 4) of ankle and pitch at the end of stances `which` and at the beginning of the next ones."""
+    edges = []
+    for stance, inner, edge in ((which, 0.98, 1.0), (which + 1, 0.02, 0.0)):
+        a, b = (stand(steps, stance, np.full(len(stance), u), neutral) for u in (inner, edge))
+        span = (edge - inner) * (steps.off[stance] - steps.on[stance])
+        change = np.concatenate([b.ankle - a.ankle, (b.pitch - a.pitch)[:, None]], axis=-1)
+        edges.append(change / span[:, None])
+    return edges[0], edges[1]
+
+
+def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Ankle ahead of and above the hip joint (N,), (N,) metres, and the sole's pitch (N,), from the published
+    angles."""
+    parts = []
+    for at in (share, 1.0 - share):
+        thigh, knee, ankle = np.moveaxis(tables.swing_angles(at, speed), -1, 0)
+        shank = thigh - knee
+        ahead = thigh_shank[0] * np.sin(thigh) + thigh_shank[1] * np.sin(shank)
+        up = -thigh_shank[0] * np.cos(thigh) - thigh_shank[1] * np.cos(shank)
+        parts.append((ahead, up, -shank - ankle))
+    ahead_share, back_share = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
+    side_share = np.sin(direction) ** 2
+    (x0, z0, p0), (x1, z1, p1) = parts
+    return (
+        ahead_share * x0 + back_share * x1,
+        ahead_share * z0 + back_share * z1 + side_share * 0.5 * (z0 + z1),
+        ahead_share * p0 + 0.6 * back_share * p1 + side_share * np.radians(8.0),
+    )
+
+
+def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
+    """What has to be added (N, C) along a swing so that it begins and ends `offset`s away with `speed`s changed.
+
+    Offsets are spread over the whole swing; speeds are mended within its first and last third.
+    """
+    reach = 1.0 / 3.0
+    blend = quintic_step(share)[:, None]
+    out = offset0 * (1.0 - blend) + offset1 * blend
+    for s, speed, sign in ((share, speed0, 1.0), (1.0 - share, speed1, -1.0)):
+        inside = np.clip(s / reach, 0.0, 1.0)
+        out = out + sign * speed * (length * s * (1.0 - inside) ** 2)[:, None]
+    return out
+
+
+def _small_step(share, leave, land, lift) -> np.ndarray:
+    """A foot that is only put elsewhere (N, 4): straight over, a little lifted."""
+    out = leave + (land - leave) * quintic_step(share)[:, None]
+    out[:, 2] += lift * np.sin(np.pi * share) ** 2
+    return out
+
+
+def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
+    """How much (N,) metres the swinging foot has to be lifted so that toes and heel pass above the ground."""
+    wanted = 0.014 * size * np.sin(np.pi * share) ** 2
+    return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
+
+
+def lift_off_ground(
+    ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0
+) -> np.ndarray:
+    """How much (T,) metres a foot has to be raised for its lowest point to be `clearance` above the ground, softly.
+
+    ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive.
+    """
+    ball_ahead, drop, ball_up = neutral.ball[0, 0], -neutral.ball[0, 2], neutral.ankle_height + neutral.ball[0, 2]
+    toe = ankle_up - (ball_ahead + neutral.tip) * np.sin(pitch) - drop * np.cos(pitch) - ball_up
+    heel = ankle_up + neutral.heel * np.sin(pitch) - neutral.ankle_height * np.cos(pitch)
+    soft = 0.006
+    return soft * np.logaddexp(0.0, (clearance - np.minimum(toe, heel)) / soft)

@@ -1,0 +1,270 @@
+"""Made touches of the ball on the run: kicks, a trap, a dribble.
+
+Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the
+touch). Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci
+Sports Exerc 34) and Lees, Asai, Andersen, Nunome and Sterzing 2010 (J Sports Sci 28): backswing to 100 degrees of
+knee flexion, impact with the knee near 45 and opening, support foot down a fifth of a second before, the opposite arm
+flung out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from ..base.easing import quintic_step
+from . import gait_tables as tables
+from ..motion import quaternion
+from ..motion.retargeting.adult import adult_skeleton
+from .course import Course, GaitStyle, plan
+from .footsteps import Footsteps, lift_off_ground
+from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
+from .keyed import envelope, keyed, mixed
+from ..motion.motion import Motion
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+
+LEFT, RIGHT = 0, 1
+
+
+@dataclass(frozen=True, eq=False)
+class Gesture:
+    """A made move. motion; key: seconds of the key moment (None for continuous moves); start, end: seconds of the
+    move."""
+
+    motion: Motion
+    key: float | None
+    start: float
+    end: float
+
+
+@dataclass(frozen=True)
+class Strike:
+    """How the right foot meets the ball and what the body does meanwhile; seconds from the touch, metres, degrees.
+
+    foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); an adult's metres. pelvis,
+    spine: rows (time, list, tilt, turn). left_arm, right_arm: rows (time, flexion, abduction, inward, elbow). speeds:
+    rows (time, m/s). pace: factor on the cadence around the touch. at: share of the right foot's swing at which it
+    touches. sink: rows (time, metres the hips are lowered). head: nod in degrees. fling: share of the arms' and trunk's
+    rows that is laid over the run."""
+
+    foot: tuple
+    pelvis: tuple
+    spine: tuple
+    left_arm: tuple
+    right_arm: tuple
+    speeds: tuple
+    pace: float
+    at: float
+    sink: tuple
+    head: float = 14.0
+    fling: float = 1.0
+
+
+_KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), (1.0, 1.6), (2.2, 2.3))
+STRIKES = {
+    "kick low inside": Strike(
+        foot=(
+            (-0.15, -0.42, -0.14, 0.34, 45, -35, 0),
+            (0.0, 0.30, -0.11, 0.105, 2, -68, -6),
+            (0.09, 0.58, -0.08, 0.22, -4, -62, -8),
+            (0.20, 0.60, -0.09, 0.32, 0, -40, -4),
+        ),
+        pelvis=((-0.15, 4, 4, -20), (0.0, 5, -2, 6), (0.18, 3, -4, 16)),
+        spine=((-0.15, -10, 8, 24), (0.0, -9, 10, -4), (0.18, -4, 12, -16)),
+        left_arm=((-0.15, -12, 48, 10, 30), (0.0, 22, 42, 20, 38), (0.2, 36, 24, 30, 48)),
+        right_arm=((-0.15, 26, 22, 25, 42), (0.0, -16, 32, 15, 34), (0.2, -28, 30, 10, 30)),
+        speeds=_KICK_SPEEDS,
+        pace=0.86,
+        at=0.46,
+        sink=((-0.1, 0.01), (0.0, 0.015), (0.2, 0.005)),
+    ),
+    "kick low top": Strike(
+        foot=(
+            (-0.14, -0.52, -0.16, 0.50, 88, -8, 0),
+            (0.0, 0.24, -0.09, 0.175, 36, -10, 6),
+            (0.07, 0.66, 0.02, 0.42, 18, 2, 4),
+            (0.17, 0.70, 0.10, 0.72, -10, 10, 0),
+            (0.30, 0.56, 0.06, 0.48, -2, 6, 0),
+        ),
+        pelvis=((-0.14, 4, 6, -32), (0.0, 8, -6, 2), (0.17, 4, -12, 26)),
+        spine=((-0.14, -14, 2, 42), (0.0, -16, 10, 2), (0.17, -8, 26, -30)),
+        left_arm=((-0.16, -30, 78, 0, 18), (0.0, 24, 62, 15, 30), (0.18, 58, 26, 40, 42)),
+        right_arm=((-0.16, 34, 24, 25, 48), (0.0, -26, 36, 10, 34), (0.18, -48, 36, 0, 22)),
+        speeds=_KICK_SPEEDS,
+        pace=0.80,
+        at=0.42,
+        sink=((-0.1, 0.015), (0.0, 0.02), (0.2, 0.0)),
+    ),
+    "receive foot low inside": Strike(
+        foot=(
+            (-0.16, 0.26, -0.14, 0.16, 0, -48, 0),
+            (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
+            (0.16, 0.10, -0.15, 0.13, 2, -66, -4),
+            (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
+        ),
+        pelvis=((-0.16, 4, 2, -4), (0.0, 5, 0, 2), (0.16, 4, 2, -10)),
+        spine=((-0.16, -6, 9, 4), (0.0, -7, 12, -2), (0.16, -5, 14, 6)),
+        left_arm=((-0.16, 12, 40, 15, 42), (0.0, 16, 46, 15, 40), (0.2, 12, 40, 15, 45)),
+        right_arm=((-0.16, 4, 36, 15, 42), (0.0, -6, 42, 15, 40), (0.2, 6, 36, 15, 42)),
+        speeds=((-2.4, 2.4), (-1.2, 2.2), (-0.4, 1.2), (0.0, 0.8), (0.4, 0.9), (1.0, 1.9), (2.2, 2.6)),
+        pace=0.72,
+        at=0.5,
+        sink=((-0.1, 0.04), (0.0, 0.05), (0.25, 0.04)),
+        head=24.0,
+    ),
+}
+
+
+# a kick at full run: shares of the run's speed, the body hardly slows for it
+_RUNNING_SPEEDS = ((-0.8, 1.0), (-0.35, 1.0), (0.0, 0.96), (0.25, 0.95), (0.8, 1.0))
+# m/s between which a kick becomes one at full run, and there the factor on cadence and the share of the standing foot's
+# stance that has passed at the touch
+_FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE = (3.0, 6.0), 0.93, 0.45
+
+
+# seconds that the kicking foot needs for its way to the ground
+_LANDING = 0.1
+
+
+def strike(
+    kind: str,
+    skeleton: Skeleton | None = None,
+    fps: float = 60.0,
+    speed: float = 1.0,
+    seed: int = 0,
+    *,
+    at_speed: float | None = None,
+    example: Motion | None = None,
+) -> Gesture:
+    """The right foot meets the ball after an approach and runs on: `kind` is one of STRIKES; facing and travelling +X.
+
+    speed: factor on the approach's speed. at_speed: m/s of a run in which the kick happens, instead of an approach that
+    slows down. example: as for `gait`. At the key moment the ball is at the foot, see `foot` of the Strike.
+    """
+    recipe = STRIKES[kind] if at_speed is None else _on_the_run(STRIKES[kind], at_speed)
+    neutral = neutral_stance(skeleton or adult_skeleton(), example)
+    key = -recipe.speeds[0][0]
+    end = key + recipe.speeds[-1][0]
+    times = np.arange(int(round(end * fps)) + 1) / fps
+    speeds = speed * keyed(recipe.speeds, times - key)[:, 0]
+    style = GaitStyle(head=np.radians(recipe.head))
+    course = plan(speeds, None, fps, neutral, style=style, seed=seed)
+    course = _in_step(course, key, recipe)
+    steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
+    posture = posture_over(course, steps, neutral, style, seed)
+    posture = _laid_over(posture, course, steps, key, recipe, neutral)
+    begin, land = _swing_around(steps[RIGHT], key)
+    return Gesture(to_motion(posture.frames(course.asked), neutral), key, begin - 0.15, land + 0.1)
+
+
+def _on_the_run(recipe: Strike, speed: float) -> Strike:
+    """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the
+    touch falls into the middle of the standing foot's short stance."""
+    share = float(quintic_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
+    duty = float(tables.at_speed("duty", speed))
+    at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
+    return replace(
+        recipe,
+        speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
+        pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
+        at=recipe.at + (max(at, recipe.at) - recipe.at) * share,
+        fling=1.0 - 0.5 * share,
+    )
+
+
+def _in_step(course: Course, key: float, recipe: Strike) -> Course:
+    """The course with a cadence that dips around the touch, and a phase at which the right foot is in its swing
+    there."""
+    rate = np.gradient(course.phase, course.times)
+    dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key - 0.1) / 0.33) ** 2))
+    phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate * dip)[1:] + 0.5 * (rate * dip)[:-1])])
+    phase = phase * (course.times[1] - course.times[0])
+    duty = float(tables.at_speed("duty", np.interp(key - 0.2, course.times, course.gear)))
+    wanted = 0.5 + duty + recipe.at * (1.0 - duty)
+    return replace(course, phase=phase + wanted - np.interp(key, course.times, phase))
+
+
+def _swing_around(steps: Footsteps, moment: float) -> tuple[float, float]:
+    """Seconds at which the swing around `moment` begins and ends."""
+    which = int(steps.current(np.array([moment]))[0])
+    return float(steps.off[which]), float(steps.on[which + 1])
+
+
+def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Strike, neutral: Neutral) -> Posture:
+    scale = neutral.leg / tables.LEG
+    times = course.times - key
+    hips = posture.hips.copy()
+    ease = envelope(times, -0.42, -0.16, 0.26, 0.65)
+    hips[:, 2] -= scale * ease * keyed(recipe.sink, times)[:, 0]
+    posture = with_feet(posture.changed(hips=hips), course.times, steps, neutral)
+    fling = recipe.fling * ease
+    pelvis = mixed(posture.pelvis, np.radians(keyed(recipe.pelvis, times)), fling)
+    spine = mixed(posture.spine, np.radians(keyed(recipe.spine, times)), fling)
+    head = posture.head - (pelvis + spine - posture.pelvis - posture.spine) * np.array([0.8, 0.6, 0.95])
+    arms = posture.arms.copy()
+    for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
+        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), fling)
+    posture = posture.changed(pelvis=pelvis, spine=spine, head=head, arms=arms)
+    return _kicking_foot(posture, course, steps[RIGHT], key, recipe.foot, neutral)
+
+
+def _kicking_foot(
+    posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral
+) -> Posture:
+    """The right foot's swing around `key` seconds led through the rows of a Strike; its ends stay as they were."""
+    swing = _swing_around(steps, key)
+    scale = neutral.leg / tables.LEG
+    inside = (course.times > swing[0]) & (course.times < swing[1])
+    edges = np.flatnonzero(inside)[[0, -1]] + [-1, 1]
+    ground = posture.hips * [1.0, 1.0, 0.0]
+    into = quaternion.about_up(-posture.heading)
+    frame = np.concatenate([quaternion.rotate(into, posture.ankles[:, RIGHT] - ground), posture.feet[:, RIGHT]], axis=1)
+    frame[:, 5] -= posture.heading
+    rows = np.array([r for r in rows if swing[0] + 0.04 < key + r[0] < swing[1] - _LANDING], dtype=float)
+    values = np.column_stack([rows[:, 1:4] * scale, np.radians(rows[:, [6, 4, 5]])])
+    at = np.concatenate([course.times[edges[:1]], key + rows[:, 0], course.times[edges[1:]]])
+    speeds = np.gradient(frame, course.times, axis=0)[edges + [-1, 1]]
+    through = np.concatenate([frame[edges[:1]], values, frame[edges[1:]]])
+    path = CubicSpline(at, through, axis=0, bc_type=((1, speeds[0]), (1, speeds[1])))(course.times[inside])
+    ankles, feet = posture.ankles.copy(), posture.feet.copy()
+    back = quaternion.about_up(posture.heading[inside])
+    free = ground[inside] + quaternion.rotate(back, path[:, :3])
+    hip = hip_joints(posture, neutral)[inside, RIGHT]
+    ankles[inside, RIGHT] = kept_bent(free, hip, course.times[inside], steps, sum(thigh_shank(neutral, RIGHT)))
+    edge = np.sin(np.pi * (course.times[inside] - swing[0]) / (swing[1] - swing[0]))
+    ankles[inside, RIGHT, 2] += lift_off_ground(ankles[inside, RIGHT, 2], path[:, 4], neutral) * np.sqrt(
+        np.maximum(edge, 0.0)
+    )
+    feet[inside, RIGHT] = path[:, 3:] + np.stack([0 * path[:, 0], 0 * path[:, 0], posture.heading[inside]], axis=-1)
+    return posture.changed(ankles=ankles, feet=feet)
+
+
+def dribble(
+    speed: float, duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, **way
+) -> Motion:
+    """Running with the ball at the feet: short strides, bent knees, the eyes down, each right swing ends in a touch.
+
+    `way`: turn_rate, phase as for `gait`.
+    """
+    neutral = neutral_stance(skeleton or adult_skeleton())
+    style = GaitStyle(cadence=1.12, crouch=np.radians(7), lean=np.radians(4), head=np.radians(30), abduct=np.radians(9))
+    course = plan(speed, duration, fps, neutral, style=style, seed=seed, **way)
+    steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
+    posture = posture_over(course, steps, neutral, style, seed)
+    ankles, feet = posture.ankles.copy(), posture.feet.copy()
+    which = steps[RIGHT].current(course.times)
+    share = (course.times - steps[RIGHT].off[which]) / (steps[RIGHT].on[which + 1] - steps[RIGHT].off[which])
+    touch = np.where(share > 0, np.exp(-(((np.clip(share, 0, 1) - 0.78) / 0.1) ** 2)), 0.0)
+    touch = touch * quintic_step(np.clip((1.0 - share) / 0.1, 0, 1))
+    scale = neutral.leg / tables.LEG
+    ahead = np.stack([np.cos(posture.heading), np.sin(posture.heading), 0 * touch], axis=-1)
+    ankles[:, RIGHT] += 0.05 * scale * touch[:, None] * ahead
+    feet[:, RIGHT, 1] += np.radians(16) * touch
+    feet[:, RIGHT, 2] -= np.radians(22) * touch
+    ankles[:, RIGHT, 2] += touch * lift_off_ground(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
+    posture = posture.changed(ankles=ankles, feet=feet)
+    return to_motion(posture.frames(course.asked), neutral)

@@ -1,0 +1,1 @@
+"""Recordings with known answers, for tests, benchmarks and the sample."""

@@ -1,0 +1,278 @@
+"""A made match of which every touch is known: for tests, for figures, and to see what a solver makes of a feed.
+
+Twenty-two players wander about their places in two formations. Somebody has the ball, drives it on or not, and plays
+it to another of his team, along the ground or through the air; the ball obeys `ball.flight`. Whoever takes it comes to
+where the ball is, with an opponent near him; opponents take some balls; some go out and are thrown in.
+`planted_feed.sampled` makes of it what a feed would deliver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...ball.flight import Flight, Launch, fly
+from ...ball.physics import FOOTBALL, Ball, rolling_spin
+
+LENGTH, WIDTH = 105.0, 68.0
+TEAMS = ("home", "away")
+_ROWS = ((-47.0, (0.0,)), (-30.0, (-22.0, -8.0, 8.0, 22.0)), (-12.0, (-24.0, -8.0, 8.0, 24.0)), (4.0, (-10.0, 10.0)))
+_HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # metres of the ball's centre: above the first head, above the second chest
+_HOLD = 9.0  # seconds over which a player leaves his place for a ball and comes back
+
+
+@dataclass(frozen=True, eq=False)
+class PlantedTouch:
+    """Somebody changes the ball's course: time s, player (id), part ("foot", "chest", "head", "hand"), word ("kick",
+    "receive", "dribble", "header", "throw-in"); position (3,) m of the ball's centre, before and after (3,) m/s."""
+
+    time: float
+    player: str
+    part: str
+    word: str
+    position: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+
+
+@dataclass(eq=False)
+class PlantedMatch:
+    """What truly happened. ids: of the P players, teams' players one after the other. touches in order. flights: after
+    each touch the ball's way until the next. outs: (time, line) where the ball left the pitch, "touch" or "goal". held:
+    (from, until, place (3,)) where somebody holds it for a throw-in. seconds: how long it lasts."""
+
+    seconds: float
+    ids: tuple[str, ...]
+    ball: Ball = FOOTBALL
+    touches: list[PlantedTouch] = field(default_factory=list)
+    flights: list[Flight] = field(default_factory=list)
+    outs: list[tuple[float, str]] = field(default_factory=list)
+    held: list[tuple[float, float, np.ndarray]] = field(default_factory=list)
+    places: "_Places" = None
+
+    def ball_at(self, times: np.ndarray) -> np.ndarray:
+        """(N, 3) m: the ball's centre."""
+        starts = np.array([touch.time for touch in self.touches])
+        which = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
+        out = np.empty((len(times), 3))
+        for i in np.unique(which):
+            out[which == i] = self.flights[i].at(np.asarray(times)[which == i])
+        for start, end, place in self.held:
+            out[(times >= start) & (times < end)] = place
+        return out
+
+    def players_at(self, times: np.ndarray) -> np.ndarray:
+        """(P, N, 2) m: the players' places."""
+        return np.stack([self.places.at(player, np.asarray(times, float)) for player in range(len(self.ids))])
+
+    @property
+    def bounces(self) -> np.ndarray:
+        """(K,) s: when the ball met the ground and left it again."""
+        ends = [*(touch.time for touch in self.touches[1:]), self.seconds]
+        found = [flight.bounces[flight.bounces < end] for flight, end in zip(self.flights, ends)]
+        return np.concatenate(found) if found else np.zeros(0)
+
+
+def planted_match(seconds: float = 120.0, seed: int = 0) -> PlantedMatch:
+    """A made match of `seconds`; the same seed makes the same one."""
+    return _Play(seconds, seed).whole()
+
+
+class _Places:
+    """Where everybody is: a slow wander about his place, and the balls that he goes to."""
+
+    def __init__(self, rng: np.random.Generator):
+        rows = [(x, y) for x, ys in _ROWS for y in ys]
+        self.home = np.array([*rows, *((-x, -y) for x, y in rows)])
+        self.period = rng.uniform(9.0, 21.0, (len(self.home), 2))
+        self.phase = rng.uniform(0.0, 2.0 * np.pi, (len(self.home), 2))
+        self.wide = rng.uniform(1.5, 5.0, (len(self.home), 2)) * np.where(np.abs(self.home[:, :1]) > 40.0, 0.4, 1.0)
+        self.drawn: list[list[tuple[float, np.ndarray]]] = [[] for _ in self.home]
+        self.ways: dict[int, Callable[[np.ndarray], np.ndarray]] = {}
+
+    def wander(self, player: int, times: np.ndarray) -> np.ndarray:
+        """(N, 2) m without any ball."""
+        angle = 2.0 * np.pi * times[:, None] / self.period[player] + self.phase[player]
+        return self.home[player] + self.wide[player] * np.sin(angle)
+
+    def send(self, player: int, time: float, place: np.ndarray) -> None:
+        """He is at `place` (2,) at `time`; times of one player only grow."""
+        self.drawn[player].append((time, place - self.wander(player, np.array([time]))[0]))
+        self.ways.pop(player, None)
+
+    def stay(self, player: int, since: float) -> None:
+        """He has been where he was last sent to since then."""
+        time, away = self.drawn[player][-1]
+        wandered = self.wander(player, np.array([time, since]))
+        earlier = [one for one in self.drawn[player][:-1] if one[0] < since]
+        self.ways.pop(player, None)
+        self.drawn[player] = [*earlier, (since, away + wandered[0] - wandered[1]), (time, away)]
+
+    def at(self, player: int, times: np.ndarray) -> np.ndarray:
+        """(N, 2) m."""
+        if player not in self.ways:
+            self.ways[player] = self._away(player)
+        return self.wander(player, times) + self.ways[player](times)
+
+    def _away(self, player: int) -> Callable[[np.ndarray], np.ndarray]:
+        """Metres from his wander: through all that he was sent to, smoothly, and back where there is time."""
+        from scipy.interpolate import PchipInterpolator
+
+        knots: list[tuple[float, np.ndarray]] = [(-_HOLD, np.zeros(2))]
+        for time, away in self.drawn[player]:
+            if time - knots[-1][0] > 2.0 * _HOLD:
+                knots += [(knots[-1][0] + _HOLD, np.zeros(2)), (time - _HOLD, np.zeros(2))]
+            knots.append((time, away))
+        knots.append((knots[-1][0] + _HOLD, np.zeros(2)))
+        when, where = np.array([time for time, _ in knots]), np.array([away for _, away in knots])
+        smooth = PchipInterpolator(when, where)
+        return lambda times: smooth(np.clip(times, when[0], when[-1]))
+
+    def ready(self, player: int, time: float, place: np.ndarray) -> bool:
+        """Whether he can be at `place` at `time` without running faster than a man."""
+        last = self.drawn[player][-1][0] if self.drawn[player] else -_HOLD
+        here = self.at(player, np.array([min(last, time) if time - last < _HOLD else time]))[0]
+        left = max(time - last, 0.05) if time - last < _HOLD else _HOLD
+        return np.linalg.norm(place - here) < 4.5 * left
+
+
+class _Play:
+    """The match as it is made, touch by touch."""
+
+    def __init__(self, seconds: float, seed: int):
+        self.rng = np.random.default_rng(seed)
+        self.places = _Places(self.rng)
+        ids = tuple(f"{team}_{number}" for team in TEAMS for number in range(1, 12))
+        self.match = PlantedMatch(seconds, ids, places=self.places)
+        self.holder, self.time = 10, 1.0
+        self.position, self.before = np.array([0.0, 0.0, FOOTBALL.radius]), np.zeros(3)
+
+    def whole(self) -> PlantedMatch:
+        self._meet("kick", "foot")
+        while self.time < self.match.seconds:
+            self._pass()
+            for _ in range(self.rng.choice(4, p=(0.3, 0.3, 0.25, 0.15)) if self.position[2] < 0.5 else 0):
+                self._drive()
+        return self.match
+
+    def _meet(self, word: str, part: str) -> None:
+        """The holder comes to the ball."""
+        self.word, self.part = word, part
+        reach = self.rng.uniform(0.1, 0.3) if part in ("head", "chest") else self.rng.uniform(0.2, 0.6)
+        angle = self.rng.uniform(0.0, 2.0 * np.pi)
+        place = self.position[:2] + reach * np.array([np.cos(angle), np.sin(angle)])
+        self.places.send(self.holder, self.time, place)
+        if self.rng.random() < 0.4:
+            self._press(place)
+
+    def _press(self, place: np.ndarray) -> None:
+        """An opponent comes near."""
+        others = [p for p in range(22) if p // 11 != self.holder // 11 and self._free(p)]
+        away = [np.linalg.norm(self.places.at(p, np.array([self.time]))[0] - place) for p in others]
+        if others and min(away) < 12.0:
+            angle = self.rng.uniform(0.0, 2.0 * np.pi)
+            beside = place + self.rng.uniform(0.9, 2.5) * np.array([np.cos(angle), np.sin(angle)])
+            if self.places.ready(others[int(np.argmin(away))], self.time, beside):
+                self.places.send(others[int(np.argmin(away))], self.time, beside)
+
+    def _free(self, player: int) -> bool:
+        return not self.places.drawn[player] or self.places.drawn[player][-1][0] < self.time - 1.0
+
+    def _flight(self, velocity: np.ndarray, spin: np.ndarray, seconds: float) -> Flight:
+        return fly(Launch(self.time, self.position, velocity, spin), self.match.ball, seconds)
+
+    def _play(self, flight: Flight, time: float) -> None:
+        """The touch is made: the ball leaves, and goes on until `time`."""
+        velocity, who = np.array(flight.launch.velocity), self.match.ids[self.holder]
+        self.match.touches.append(
+            PlantedTouch(self.time, who, self.part, self.word, self.position.copy(), self.before.copy(), velocity)
+        )
+        self.match.flights.append(flight)
+        self.time = time
+        self.position, self.before = flight.at([time])[0], flight.velocity([time])[0]
+
+    def _along(self, speed: float, angle: float) -> Flight:
+        """Along the ground, turning as it rolls or less."""
+        velocity = speed * np.array([np.cos(angle), np.sin(angle), 0.0])
+        return self._flight(velocity, self.rng.uniform(0.2, 1.0) * rolling_spin(velocity, self.match.ball), 4.0)
+
+    def _drive(self) -> None:
+        """One more touch by the holder: the ball rolls on, and he runs after it."""
+        angle = self.rng.uniform(-0.8, 0.8) + np.arctan2(*-self.position[1::-1])
+        self.word = "dribble" if self.word == "kick" else self.word
+        self._play(self._along(self.rng.uniform(2.0, 6.5), angle), self.time + self.rng.uniform(0.45, 1.4))
+        self._meet("dribble", "foot")
+
+    def _pass(self) -> None:
+        """The ball to somebody: the first of some tries that a man can meet."""
+        others = np.array([p for p in range(22) if p != self.holder])
+        here = np.array([self.places.at(p, np.array([self.time + 1.0]))[0] for p in others])
+        away = np.linalg.norm(here - self.position[:2], axis=1)
+        share = np.exp(-away / 15.0) * np.where(others // 11 == self.holder // 11, 1.0, 0.12) * (away > 4.0) + 1e-9
+        goes_out = self.rng.random() < 0.03
+        for i in self.rng.choice(len(others), 0 if goes_out else 25, p=share / share.sum()):
+            meets = self._tried(int(others[i]), here[i] - self.position[:2]) if self._free(others[i]) else None
+            if meets is not None:
+                self.word = "kick" if self.word == "dribble" else self.word
+                self._play(*meets)
+                return self._arrive(int(others[i]))
+        return self._out()
+
+    def _tried(self, other: int, way: np.ndarray) -> tuple[Flight, float] | None:
+        """A ball played `way` (2,) m to `other`, and when he can take it; None where he cannot."""
+        far, angle = float(np.linalg.norm(way)), np.arctan2(way[1], way[0])
+        across = way / far
+        if self.rng.random() < min(0.25 + far / 60.0, 0.8):
+            rise = np.radians(self.rng.uniform(15.0, 45.0))
+            speed = np.sqrt(far * 9.8 / (0.8 * np.sin(2.0 * rise))) * self.rng.uniform(0.9, 1.25)
+            speed = min(speed, 15.0) if self.part == "head" else speed
+            velocity = speed * np.array([*(np.cos(rise) * across), np.sin(rise)])
+            flight = self._flight(velocity, np.array([0.0, 0.0, self.rng.normal(0.0, 25.0)]), 4.0)
+        else:
+            most = 12.0 if self.part == "head" else 24.0
+            flight = self._along(min(np.sqrt(self.rng.uniform(3.0, 11.0) ** 2 + 3.5 * far), most), angle)
+        times = np.arange(self.time + 0.35, self.time + 4.0, 0.02)
+        path = flight.at(times)
+        fits = (path[:, 2] < _LOW) & (np.abs(path[:, 0]) < LENGTH / 2) & (np.abs(path[:, 1]) < WIDTH / 2)
+        near = np.flatnonzero(fits & (np.abs((path[:, :2] - self.position[:2]) @ across - far) < 3.0))
+        for i in self.rng.permutation(near)[:3]:
+            if self.places.ready(other, times[i], path[i, :2]):
+                return flight, float(times[i])
+        return None
+
+    def _arrive(self, other: int) -> None:
+        """`other` takes the ball: he stops it, or plays on at once."""
+        self.holder = other
+        height = self.position[2]
+        part = "head" if height > _HIGH else "chest" if height > _CHEST else "foot"
+        at_once = part == "head" or self.rng.random() < 0.25
+        self._meet("header" if part == "head" else "kick" if at_once else "receive", part)
+        if not at_once:
+            angle, speed = self.rng.uniform(0.0, 2.0 * np.pi), self.rng.uniform(0.5, 4.0)
+            velocity = np.array([speed * np.cos(angle), speed * np.sin(angle), -0.1])
+            self._play(self._flight(velocity, np.zeros(3), 4.0), self.time + self.rng.uniform(0.6, 1.6))
+            self._meet("kick", "foot")
+
+    def _out(self) -> None:
+        """Over the touch line; then a throw-in."""
+        side = 1.0 if self.position[1] >= 0.0 else -1.0
+        left = WIDTH / 2 + 2.0 - side * self.position[1]
+        flight = self._flight(np.array([2.0, side * (12.0 + 0.3 * left), 3.0]), np.zeros(3), 12.0)
+        times = np.arange(self.time, self.time + 12.0, 0.01)
+        beyond = np.flatnonzero(np.abs(flight.at(times)[:, 1]) > WIDTH / 2)
+        if len(beyond):
+            self.match.outs.append((float(times[beyond[0]]), "touch"))
+        self._play(flight, self.time + 12.0)
+        self.holder = self._nearest_opponent()
+        self.position = np.array([np.clip(self.position[0], -50.0, 50.0), side * (WIDTH / 2 + 0.2), 2.0])
+        self.before = np.zeros(3)
+        self.match.held.append((self.time - 3.0, self.time, self.position))
+        self._meet("throw-in", "hand")
+        self.places.stay(self.holder, self.time - 3.0)
+
+    def _nearest_opponent(self) -> int:
+        others = [p for p in range(22) if p // 11 != self.holder // 11]
+        here = [np.linalg.norm(self.places.at(p, np.array([self.time]))[0] - self.position[:2]) for p in others]
+        return others[int(np.argmin(here))]

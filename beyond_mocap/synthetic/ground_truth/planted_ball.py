@@ -1,0 +1,119 @@
+"""A ball planted in a hand: held, released and flying, with one marker that turns with it, all of it known.
+
+Until release the ball goes with the hand; then its centre flies on with the velocity it had (no air unless asked for)
+and the ball turns at a steady rate, as in Fredriksson §6.3 eq. 6.2-6.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.time_series import interpolate
+from ...base.errors import InputError
+from ...motion import quaternion
+from ...motion.motion import Motion, forward_kinematics
+from .planted_body import adult_share
+
+GRAVITY = 9.81  # m/s^2
+_GRIP = (0.012, 0.105, -0.036)  # of a left hand in a T-pose: between the fingers, on the palm's side
+_MARKER = (0.25, 0.15, -0.95)  # where the marker sits on a held ball, as seen from its centre
+_FINE = 1e-3  # s between places from which the velocity at release is read, and steps through air
+
+
+@dataclass(frozen=True)
+class PlantedBall:
+    """What is asked for.
+
+    release: seconds at which the ball leaves the hand. side: "Left" or "Right". radius: metres. turns: revolutions a
+    second in flight. seen: seconds of flight after which no camera sees it. drag: 1/m, see `ball.physics`. label: the
+    marker's. grip: (3,) metres, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
+    """
+
+    release: float
+    side: str = "Right"
+    radius: float = 0.0366
+    turns: float = 12.0
+    seen: float = 0.3
+    drag: float = 0.0
+    label: str = "BALL"
+    grip: tuple[float, float, float] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class BallTruth:
+    """What came out: places (T, 3) metres of the ball's centre and marker (T, 3) of the marker, without noise.
+
+    position, velocity: (3,) m and m/s of the centre at release. spin: (3,) radians a second in flight. grip: (3,)
+    metres in the hand's axes. asked: the ball that was planted.
+    """
+
+    asked: PlantedBall
+    places: np.ndarray
+    marker: np.ndarray
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    grip: np.ndarray
+
+    @property
+    def speed(self) -> float:
+        """Metres a second at release."""
+        return float(np.linalg.norm(self.velocity))
+
+
+def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
+    """The ball of a motion in marker axes (`planted_body`). InputError without that hand, or a release outside."""
+    name = asked.side + "Hand"
+    if name not in truth.skeleton.names:
+        raise InputError("planted ball", f"no joint {name}", "a body with that hand", "give the other side")
+    if not 0.0 < asked.release < truth.duration:
+        raise InputError("planted ball", f"release at {asked.release:g} s", f"within 0 to {truth.duration:g} s")
+    hand = truth.skeleton.index(name)
+    mirrored = np.array([1.0, 1.0 if asked.side == "Left" else -1.0, 1.0])
+    grip = np.array(asked.grip) if asked.grip is not None else _GRIP * mirrored * adult_share(truth.skeleton)
+    positions, turns = (rows[:, hand] for rows in forward_kinematics(truth))
+    held = positions + quaternion.rotate(turns, grip)
+    outward = np.array(_MARKER) * mirrored
+    outward = asked.radius * outward / np.linalg.norm(outward)
+    times = np.arange(len(truth)) / truth.fps
+    position, velocity, turn = _at_release(times, held, turns, asked.release)
+    spin = 2.0 * np.pi * asked.turns * _backspin(velocity)
+    after = np.maximum(times - asked.release, 0.0)
+    flown = _flight(position, velocity, after, asked.drag)
+    flying = times > asked.release
+    places = np.where(flying[:, None], flown, held)
+    spun = quaternion.multiply(quaternion.from_rotation_vector(after[:, None] * spin), turn)
+    marker = places + quaternion.rotate(np.where(flying[:, None], spun, turns), outward)
+    return BallTruth(asked, places, marker, position, velocity, spin, grip)
+
+
+def _at_release(times, held, turns, release: float):
+    """Place (3,), velocity (3,) and the hand's turn (4,) at release, between the frames."""
+    from scipy.interpolate import CubicSpline
+
+    path = CubicSpline(times, held, axis=0)
+    frame = min(max(int(release * (len(times) - 1) / times[-1]), 0), len(times) - 2)
+    share = (release - times[frame]) / (times[frame + 1] - times[frame])
+    return path(release), path(release, 1), quaternion.slerp(turns[frame], turns[frame + 1], np.array(share))
+
+
+def _backspin(velocity: np.ndarray) -> np.ndarray:
+    """The level axis (3,) about which a ball of this velocity turns backwards; any where it goes straight up."""
+    across = np.cross([0.0, 0.0, 1.0], velocity)
+    return -across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([0.0, 1.0, 0.0])
+
+
+def _flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag: float) -> np.ndarray:
+    """Places (T, 3) metres of the centre `after` (T,) seconds of flight."""
+    fall = np.array([0.0, 0.0, -GRAVITY])
+    if drag == 0.0:
+        return position + after[:, None] * velocity + 0.5 * after[:, None] ** 2 * fall
+    steps = np.arange(int(np.ceil(after.max() / _FINE)) + 2)
+    places = np.empty((len(steps), 3))
+    for step in steps:
+        places[step] = position
+        pull = fall - drag * np.linalg.norm(velocity) * velocity
+        position, velocity = position + _FINE * velocity + 0.5 * _FINE**2 * pull, velocity + _FINE * pull
+    return interpolate(after, steps * _FINE, places)

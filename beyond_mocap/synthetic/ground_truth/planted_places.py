@@ -1,0 +1,222 @@
+"""Where markers lie on a body: the places of real marker sets, for bodies in the axes of marker models.
+
+Places follow the palpation points of Plug-in Gait (Vicon), the sets of baseball pitching and sprinting laboratories,
+and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis's four follow from its hip joints
+by Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width + 10.9 mm below and
+0.33 width + 7.3 mm beside the middle of the front spines) turned round. Each place scatters by some millimetres, as
+hands do that put markers on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...motion.skeleton import Skeleton
+from .planted_body import adult_share
+
+_FOOT = (0.133, 0.0, -0.054)  # m from an adult's ankle to the toe joint
+_HEEL = 0.034  # m by which a heel's marker lies below the ankle, at least
+_DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
+
+
+@dataclass(frozen=True)
+class Place:
+    """One marker on the left side or in the middle.
+
+    on: the joint that carries it. to, share: begins at this share of the bone to the joint `to` ("shoulders": to the
+    middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres
+    by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind
+    shocks, from 0 (bone) to 1 (a thigh's flesh).
+    """
+
+    on: str
+    to: str | None
+    share: float
+    offset: tuple[float, float, float]
+    soft: float
+    wobble: float
+
+
+def _head(x, y, z):
+    return Place("Head", None, 0.0, (x, y, z), 1.5, 0.1)
+
+
+def _trunk(x, y, z, soft=7.0):
+    return Place("Chest", "shoulders", 1.0, (x, y, z), soft, 0.35)
+
+
+def _arm(share, x, z, soft=9.0):
+    return Place("Arm", "ForeArm", share, (x, 0.0, z), soft, 0.5)
+
+
+def _fore(share, x, y, z, soft=4.0):
+    return Place("ForeArm", "Hand", share, (x, y, z), soft, 0.3)
+
+
+def _hand(x, y, z):
+    return Place("Hand", None, 0.0, (x, y, z), 1.0, 0.1)
+
+
+def _thigh(share, x, y, soft=14.0, wobble=1.0):
+    return Place("UpLeg", "Leg", share, (x, y, 0.0), soft, wobble)
+
+
+def _shank(share, x, y, soft=6.0, wobble=0.5):
+    return Place("Leg", "Foot", share, (x, y, 0.0), soft, wobble)
+
+
+def _foot(to, x, y, z):
+    return Place("Foot", to, 1.0 if to else 0.0, (x, y, z), 2.0, 0.1)
+
+
+MIDDLE = {
+    "C7": _trunk(-78, 0, 45), "T7": _trunk(-98, 0, -120), "T10": _trunk(-95, 0, -195, 9.0),
+    "CLAV": _trunk(62, 0, -15, 5.0), "MAN": _trunk(60, 0, -12, 5.0), "STRN": _trunk(92, 0, -150, 8.0),
+    "RBAK": _trunk(-105, -95, -80, 9.0), "LBAK": _trunk(-105, 95, -80, 9.0),
+    "SACR": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
+    "P1": Place("Hips", None, 0.0, (-14, 0, -42), 5.0, 0.5), "P2": Place("Hips", None, 0.0, (-10, 36, -22), 5.0, 0.5),
+    "P3": Place("Hips", None, 0.0, (-10, -36, -22), 5.0, 0.5),
+}  # fmt: skip
+SIDED = {
+    "FHD": _head(95, 62, 95), "BHD": _head(-85, 62, 80), "EAR": _head(5, 80, 50),
+    "SHO": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "ACR": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "UPA": _arm(0.5, 8, 50), "UPB": _arm(0.35, -38, 22), "ARM": _arm(0.55, -8, 48),
+    "ELB": _arm(1.0, 0, 43, 5.0), "MELB": _arm(1.0, 0, -43, 5.0), "ELBM": _arm(1.0, 0, -43, 5.0),
+    "FRM": _fore(0.45, 12, 0, 40), "FOREARM": _fore(0.5, 8, 0, 38),
+    "WRA": _fore(1.0, 35, -4, 4, 2.5), "WRB": _fore(1.0, -35, -4, 4, 2.5), "WR": _fore(1.0, 0, -6, 28, 2.5),
+    "FIN": _hand(6, 82, 17), "HNDI": _hand(26, 78, 15), "HNDO": _hand(-30, 70, 15),
+    "THI": _thigh(0.6, 12, 80), "THLP": _thigh(0.3, -5, 92), "THLD": _thigh(0.65, -3, 76),
+    "THAP": _thigh(0.35, 85, 28), "THAD": _thigh(0.65, 74, 20), "THIB": _thigh(0.45, 60, 62),
+    "KNE": _thigh(1.0, 0, 57, 6.0, 0.4), "MKNE": _thigh(1.0, 0, -57, 6.0, 0.4),
+    "LEPI": _thigh(1.0, 0, 57, 6.0, 0.4), "MEPI": _thigh(1.0, 0, -57, 6.0, 0.4),
+    "PAT": _thigh(0.98, 58, 2, 8.0, 0.4),
+    "TIB": _shank(0.5, 8, 58), "TIBB": _shank(0.35, 48, 22), "TIAP": _shank(0.2, 52, 6), "TIAD": _shank(0.6, 45, 4),
+    "TILAT": _shank(0.45, 6, 58), "ANK": _shank(1.0, 0, 43, 1.5, 0.1), "MANK": _shank(1.0, 0, -43, 1.5, 0.1),
+    "LMAL": _shank(1.0, 0, 43, 1.5, 0.1), "MMAL": _shank(1.0, 0, -43, 1.5, 0.1),
+    "HEE": _foot(None, -52, 0, 12), "HEEL": _foot(None, -52, 0, 12), "MFS": _foot("ToeBase", -62, 6, 34),
+    "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 14), "P1MT": _foot("ToeBase", 4, -38, 12),
+    "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
+    "HLX": Place("ToeBase", None, 0.0, (55, -12, 14), 1.5, 0.1),
+    "ASI": Place("Hips", None, 0.0, (0, 0, 0), 6.0, 0.4), "PSI": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
+}  # fmt: skip
+_ON_BLADE = Place("Shoulder", "Arm", 1.0, (-98, -78, -85), 9.0, 0.4)  # where shoulder blades are tracked apart
+_PIG = (
+    "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
+    "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
+)
+_LEG_OF_SPRINTER = (
+    "{0}THLP {0}THLD {0}THAP {0}THAD {0}LEPI {0}PAT {0}MEPI {0}TIAP {0}TIAD {0}TILAT {0}LMAL {0}MMAL {0}HEEL {0}MFS "
+    "{0}MFL {0}P1MT {0}TOE {0}P5MT"
+)
+SETS = {
+    "plug_in_gait": tuple(_PIG.split()),
+    "driveline": tuple((_PIG + " LMELB RMELB LMKNE RMKNE LMANK RMANK").split()),
+    "sprinter": tuple(
+        (
+            "C7 RSH LSH MAN T7 LARM LELB LFOREARM LWR RARM RELB RFOREARM RWR RASI LASI SACR P1 P2 P3 "
+            + _LEG_OF_SPRINTER.format("L") + " " + _LEG_OF_SPRINTER.format("R")
+        ).split()
+    ),
+    "full": tuple(
+        (
+            "LASI RASI LPSI RPSI LFHD RFHD LBHD RBHD C7 T10 CLAV STRN LACR LBAK RACR RBAK LUPA LELB LMELB RUPA RELB "
+            "RMELB LFRM LWRA LWRB RFRM RWRA RWRB LFIN RFIN LTHI LKNE LMKNE RTHI RKNE RMKNE LTIB LANK LMANK RTIB RANK "
+            "RMANK LHEE LMT1 LMT5 RHEE RMT1 RMT5 LHLX RHLX"
+        ).split()
+    ),
+    "lower_body": tuple(
+        "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()
+    ),
+}
+"""Labels of the marker sets that can be planted."""
+STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}
+"""Markers that come off after the static trial."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """Markers on a skeleton: labels (M), their joints (M,), places (M, 3) metres in the joint's axes, and how soft the
+    skin under them is: soft (M,) metres a radian, wobble (M,)."""
+
+    labels: tuple[str, ...]
+    joint: np.ndarray
+    places: np.ndarray
+    soft: np.ndarray
+    wobble: np.ndarray
+
+
+def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: float = 0.003) -> Placed:
+    """Those of `labels` that the skeleton (`planted_body.in_marker_axes`) has a joint for, scattered by `scatter` m."""
+    rng = np.random.default_rng(seed)
+    size = adult_share(skeleton)
+    rows = []
+    for label in labels:
+        found = _place(label, "LACR" in labels)
+        shift = rng.normal(0.0, scatter, 3)
+        if found is None or found[1] + found[0].on not in skeleton.names:
+            continue
+        place, side = found
+        rows.append((label, skeleton.index(side + place.on), _at(skeleton, label, place, side, size) + shift, place))
+    return Placed(
+        tuple(row[0] for row in rows), np.array([row[1] for row in rows], int), np.array([row[2] for row in rows]),
+        np.array([row[3].soft for row in rows]) * 1e-3, np.array([row[3].wobble for row in rows]),
+    )
+
+
+def _place(label: str, blades: bool) -> tuple[Place, str] | None:
+    """Where a label lies, and the side's prefix of its joint. blades: whether shoulder blades are tracked apart."""
+    if blades and label in ("LBAK", "RBAK"):
+        return _ON_BLADE, {"L": "Left", "R": "Right"}[label[0]]
+    if label in MIDDLE:
+        return MIDDLE[label], ""
+    place = SIDED.get(label[1:])
+    if place is None or label[0] not in "LR":
+        return None
+    sided = place.on in ("Shoulder", "Arm", "ForeArm", "Hand", "UpLeg", "Leg", "Foot", "ToeBase")
+    return place, {"L": "Left", "R": "Right"}[label[0]] if sided else ""
+
+
+def _at(skeleton: Skeleton, label: str, place: Place, side: str, size: float) -> np.ndarray:
+    mirrored = -1.0 if side == "Right" or (label[0] == "R" and label not in MIDDLE) else 1.0
+    offset = np.array(place.offset) * [1.0, mirrored, 1.0] * 1e-3 * size
+    if place.on == "Hips":
+        return _on_pelvis(skeleton, label) + offset
+    if place.to == "shoulders":
+        return _shoulders(skeleton) + offset
+    if label[1:] in ("HEE", "HEEL"):  # as high as the toes', and some centimetres below the ankle on any rig
+        toes = _bone(skeleton, side + "ToeBase")[2]
+        return offset * [1.0, 1.0, 0.0] + [0.0, 0.0, min(toes + offset[2], -_HEEL * size)]
+    return place.share * _bone(skeleton, side + place.to) + offset if place.to else offset
+
+
+def _bone(skeleton: Skeleton, name: str) -> np.ndarray:
+    """From its parent to a joint (3,), at rest; nothing where there is no such joint, a usual foot without toes."""
+    if name in skeleton.names:
+        return skeleton.offsets[skeleton.index(name)]
+    return np.array(_FOOT) * adult_share(skeleton) if name.endswith("ToeBase") else np.zeros(3)
+
+
+def _shoulders(skeleton: Skeleton) -> np.ndarray:
+    """From the chest's joint to the middle between both shoulder joints (3,), or to the neck of a body without arms."""
+    arms = [_bone(skeleton, side + "Shoulder") + _bone(skeleton, side + "Arm") for side in ("Left", "Right")]
+    return np.mean(arms, axis=0) if "LeftArm" in skeleton.names else _bone(skeleton, "Neck")
+
+
+def _on_pelvis(skeleton: Skeleton, label: str) -> np.ndarray:
+    """A spine of the pelvis, or the sacrum's middle, in the hips' axes (3,)."""
+    left, right = (skeleton.offsets[skeleton.index(side + "UpLeg")] for side in ("Left", "Right"))
+    half = 0.5 * np.linalg.norm(left - right)
+    width = max((half - 0.0073) / 0.33, 0.12)
+    depth = _DEPTH * width
+    forward, up = 0.24 * depth + 0.0099, 0.30 * width + 0.0109
+    tilted = np.array([[np.cos(_TILT), 0.0, np.sin(_TILT)], [0.0, 1.0, 0.0], [-np.sin(_TILT), 0.0, np.cos(_TILT)]])
+    side = {"L": 1.0, "R": -1.0}.get(label[0], 0.0)
+    local = np.array([forward, 0.5 * width * side, up])
+    if not label.endswith("ASI"):
+        local = np.array([forward - depth, 0.2 * width * side * label.endswith("PSI"), up])
+    return 0.5 * (left + right) + tilted @ local
+

@@ -1,0 +1,168 @@
+"""How a body rests on the ground: how thick it is at each joint, how low it can lie, and lying on the side as a pose.
+
+A skeleton has no flesh; a joint lies as far above the ground as the body is thick there, in round figures for an adult.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
+
+from ..base.vectors import unit_vectors
+from . import gait_tables as tables
+from ..motion import quaternion
+from ..motion.humanoid import Humanoid, identify
+from ..motion.motion import pose_kinematics
+from ..motion.retargeting.neutral import Neutral
+from ..motion.retargeting.posture import Posture, to_motion
+from ..motion.skeleton import Skeleton
+from ..motion.track import zero_phase_hann
+
+THICKNESS = {
+    "hips": 0.09, "chest": 0.09, "neck": 0.06, "head": 0.07, "shoulder": 0.06, "upper_arm": 0.06, "lower_arm": 0.04,
+    "hand": 0.03, "upper_leg": 0.08, "lower_leg": 0.05, "foot": 0.04, "toe": 0.02,
+}
+"""Metres from a joint to the skin below it."""
+
+_OTHERS, _TIP = 0.02, 0.01
+_RAISED = np.radians(np.arange(0.0, 100.0, 1.0))  # by how much an arm may be turned up
+_EVEN_SECONDS = 0.3
+
+
+def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) -> np.ndarray:
+    """Height (T,) m of the root at which the lowest part of the body touches the ground; rotations (T, J, 4) local.
+    arms: whether they count, which give way where a body falls or rolls onto them (`arms_above_ground`)."""
+    places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
+    without = set() if arms else {joint for chain in _arms(skeleton) for joint in chain}
+    points = [(place, thick) for joint, place, thick in _surface(skeleton, places, world) if joint not in without]
+    return -np.min([place[:, 2] - thick for place, thick in points], axis=0)
+
+
+def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
+    """Local rotations (T, J, 4) with arms that reach below the ground turned up at the shoulder, evenly over time, so
+    that little of them is left below; root (T, 3) m, rotations (T, J, 4) local."""
+    places, world = pose_kinematics(skeleton, root, rotations)
+    out = rotations.copy()
+    for chain in _arms(skeleton):
+        shoulder = places[:, chain[0]]
+        points = [(p - shoulder, thick) for joint, p, thick in _surface(skeleton, places, world) if joint in chain[1:]]
+        out_level = points[-1][0][:, :2]
+        level = unit_vectors(out_level)
+        along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
+        above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
+        thick = np.array([t for _, t in points])[:, None]
+        raised = above * np.cos(_RAISED) + along * np.sin(_RAISED) - thick + shoulder[:, 2, None, None]
+        angle = _RAISED[_first_enough(raised.min(axis=1))]
+        axis = np.stack([level[:, 1], -level[:, 0], np.zeros(len(level))], axis=1)
+        turn = zero_phase_hann(axis * widened(angle, fps)[:, None], fps, _EVEN_SECONDS)
+        turned = quaternion.multiply(quaternion.from_rotation_vector(turn), world[:, chain[0]])
+        parent = world[:, skeleton.parents[chain[0]]]
+        moved = np.any(turn != 0.0, axis=1)[:, None]
+        out[:, chain[0]] = np.where(moved, quaternion.multiply(quaternion.inverse(parent), turned), out[:, chain[0]])
+    return out
+
+
+def widened(values: np.ndarray, fps: float) -> np.ndarray:
+    """An even curve (T,) that is nowhere below `values` (T,) >= 0: the greatest around each frame, then their mean."""
+    width = 2 * int(_EVEN_SECONDS * fps / 2) + 1
+    return uniform_filter1d(maximum_filter1d(values, width), width)
+
+
+def _first_enough(height: np.ndarray) -> np.ndarray:
+    """The first column (T,) of height (T, A) m that is not below the ground; the highest where all are."""
+    enough = height >= 0.0
+    return np.where(enough.any(axis=1), np.argmax(enough, axis=1), np.argmax(height, axis=1))
+
+
+def _arms(skeleton: Skeleton) -> list[list[int]]:
+    """The joints of both arms from the upper arm on, fingers too."""
+    body = identify(skeleton)
+    tops = [limb.upper_arm for limb in (body.left, body.right) if limb.upper_arm is not None]
+    return [[joint for joint in range(top, len(skeleton)) if _below(skeleton, joint, top)] for top in tops]
+
+
+def _below(skeleton: Skeleton, joint: int, top: int) -> bool:
+    while joint > top:
+        joint = skeleton.parents[joint]
+    return joint == top
+
+
+def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
+    """(joint, place (T, 3) m, thickness m) of every joint and every tip."""
+    for joint, thick in enumerate(thickness(skeleton)):
+        yield joint, places[:, joint], thick
+    for joint, tip in zip(skeleton.end_parents, skeleton.end_offsets):
+        yield joint, places[:, joint] + quaternion.rotate(world[:, joint], tip), _TIP
+
+
+def thickness(skeleton: Skeleton) -> np.ndarray:
+    """(J,) m from each joint to the skin."""
+    body = identify(skeleton)
+    out = np.full(len(skeleton), _OTHERS)
+    for role, joint in _parts(body):
+        if joint is not None:
+            out[joint] = THICKNESS[role]
+    return out
+
+
+def _parts(body: Humanoid):
+    yield from ((("chest", joint) for joint in body.spine))
+    for limb in (body.left, body.right):
+        yield from ((role, getattr(limb, role)) for role in THICKNESS if hasattr(limb, role))
+    yield from (("neck", body.neck), ("head", body.head), ("hips", body.hips))
+
+
+# degrees: flexion, abduction, inward turn and elbow of the lower and the upper arm; metres for an adult: ankles ahead
+# of the hips, along the body and above their middle; degrees: roll to the front, bend of spine and head
+_LANDING = {
+    "arms": ((150, 0, 0, 18), (140, 6, 10, 30)),
+    "ankles": ((0.12, 0.74, -0.12), (0.22, 0.62, -0.02)),
+    "roll": 8.0, "spine": (6.0, -4.0), "head": (4.0, 10.0),
+}
+_LYING = {
+    "arms": ((160, 10, 0, 50), (88, -4, 22, 70)),
+    "ankles": ((0.10, 0.62, -0.13), (0.20, 0.52, -0.07)),
+    "roll": 22.0, "spine": (14.0, 0.0), "head": (10.0, 6.0),
+}
+# degrees by which the trunk may slope up to the shoulder, and the lower arm be drawn in, for the body to lie low
+_SLOPES, _DRAWN_IN = np.meshgrid(np.arange(-6.0, 22.0, 4.0), np.arange(-5.0, 46.0, 10.0))
+
+
+def on_the_side(neutral: Neutral, left: bool, settled: bool) -> np.ndarray:
+    """Local rotations (J, 4) of lying on the left or right side, facing along +X: as one lands, arms stretched beyond
+    the head, or settled, arms and knees drawn in and rolled a little to the front. Of several slopes of the trunk and
+    places of the lower arm, which differ by skeleton, the one in which the body lies lowest."""
+    table = _LYING if settled else _LANDING
+    ways = to_motion(_side_posture(table, neutral, left), neutral)
+    body = identify(neutral.skeleton)
+    root = np.zeros((len(ways), 3))
+    root[:, 2] = lowest_root(neutral.skeleton, ways.rotations)
+    places, _ = pose_kinematics(neutral.skeleton, root, ways.rotations)
+    return ways.rotations[int(np.argmin(places[:, body.hips, 2] + 0.5 * places[:, body.chest, 2]))]
+
+
+def _side_posture(table: dict, neutral: Neutral, left: bool) -> Posture:
+    """The ways (a frame each) of lying that `table` leaves open."""
+    sign, scale, count = 1.0 if left else -1.0, neutral.leg / tables.LEG, _SLOPES.size
+    arms, ankles, feet = np.zeros((count, 2, 5)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
+    hips = np.tile([0.0, 0.0, 0.2], (count, 1))
+    for row, side in enumerate((0, 1) if left else (1, 0)):
+        arms[:, side, :4] = np.radians(table["arms"][row])
+        ahead, along, above = np.array(table["ankles"][row]) * scale
+        ankles[:, side] = hips + [ahead, -sign * along, above]
+        feet[:, side] = np.radians([-90.0 * sign, 0.0, -35.0 * sign])
+    arms[:, 0 if left else 1, 1] -= np.radians(_DRAWN_IN.ravel())
+    # on the side, sloping, then rolled to the front about the body's own length, which points to the left or right
+    slope = np.radians(sign * (_SLOPES.ravel() - 90.0))
+    side_on = quaternion.from_rotation_vector(slope[:, None] * [1.0, 0.0, 0.0])
+    roll = quaternion.from_rotation_vector(np.radians([0.0, table["roll"], 0.0]))
+    tilt, bend = np.radians(table["spine"])
+    nod, side_nod = np.radians(table["head"])
+    one = np.ones((count, 1))
+    return Posture(
+        fps=30.0, hips=hips, heading=np.zeros(count),
+        pelvis=quaternion.to_rotation_vector(quaternion.multiply(roll, side_on)),
+        spine=one * [sign * bend, tilt, 0.0], head=one * [sign * side_nod, nod, 0.0],
+        arms=arms, wrists=np.zeros((count, 2)), ankles=ankles, feet=feet, toes=np.zeros((count, 2)),
+        knees=np.zeros((count, 2)),
+    )

@@ -1,0 +1,416 @@
+"""Made strikes out of standing, as passing games need them: foot volleys, a trap, a header, chest, hand and racquet.
+
+Each begins and ends standing. The left foot stays where it is; key poses over seconds from the touch are laid over
+standing, the right foot is led through the rows of a table and set down where it was.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from . import gait_tables as tables
+from ..motion.retargeting.adult import adult_skeleton
+from .course import Course
+from .footsteps import Footsteps, lift_off_ground
+from .gait import thigh_shank, with_feet
+from .gestures import LEFT, RIGHT, Gesture
+from .keyed import envelope, keyed, mixed
+from ..motion.motion import Motion
+from .moves import standing_posture, walked_steps
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+
+BEFORE, AFTER = 1.6, 1.9
+"""Seconds of the clip before and after the touch."""
+
+_BENT = 0.012  # m by which who is ready stands lower than who stands
+_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: the most of it, and over which it is neared
+
+
+@dataclass(frozen=True)
+class Volley:
+    """How a body that stands strikes with its right side; seconds from the touch, metres of an adult, degrees.
+
+    foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); None: it stays. hips: rows
+    (time, ahead, left, lowered). pelvis, spine: rows (time, list, tilt, turn); head: rows (time, nod, turn). left_arm,
+    right_arm: rows (time, flexion, abduction, inward, elbow). wrist: rows (time, right hand's flexion). words: of the
+    vocabulary. span: seconds in which the body is not as it stands."""
+
+    words: str
+    span: tuple[float, float]
+    hips: tuple
+    pelvis: tuple
+    spine: tuple
+    head: tuple
+    left_arm: tuple
+    right_arm: tuple
+    foot: tuple | None = None
+    wrist: tuple = ((0.0, 8.0), (1.0, 8.0))
+
+
+VOLLEYS = {
+    "toss": Volley(
+        words="kick right low top standing front toss",
+        span=(-0.75, 1.0),
+        foot=(
+            (-0.30, -0.06, -0.13, 0.15, 26, -10, 0),
+            (-0.14, 0.14, -0.12, 0.22, 22, -12, 0),
+            (0.0, 0.34, -0.10, 0.38, 12, -12, 4),
+            (0.10, 0.38, -0.09, 0.50, 2, -12, 4),
+            (0.32, 0.30, -0.10, 0.38, 6, -12, 0),
+            (0.60, 0.08, -0.11, 0.14, 4, -10, 0),
+        ),
+        hips=(
+            (-0.75, 0, 0, 0),
+            (-0.42, 0.0, 0.06, 0.015),
+            (0.0, -0.02, 0.075, 0.02),
+            (0.5, -0.01, 0.06, 0.01),
+            (1.0, 0, 0, 0),
+        ),
+        pelvis=((-0.5, 0, 1, -4), (0.0, -3, -6, 4), (0.3, -1, -2, 2), (0.85, 0, 0, 0)),
+        spine=((-0.5, 0, 6, 4), (0.0, -2, 12, -4), (0.3, 0, 8, -2), (0.85, 0, 2, 0)),
+        head=((-0.6, -8, 0), (0.0, 22, 0), (0.2, 6, 0), (0.5, -18, 0), (0.85, 0, 0)),
+        left_arm=((-0.6, 6, 14, 12, 22), (0.0, 22, 42, 14, 36), (0.3, 14, 32, 14, 32), (0.85, 2, 10, 12, 16)),
+        right_arm=((-0.6, 6, 14, 12, 22), (0.0, -6, 40, 10, 34), (0.3, 4, 30, 12, 30), (0.85, 2, 10, 12, 16)),
+    ),
+    "pass": Volley(
+        words="kick right low volley standing front pass",
+        span=(-0.8, 1.0),
+        foot=(
+            (-0.40, -0.12, -0.13, 0.14, 30, -8, 0),
+            (-0.22, -0.30, -0.14, 0.30, 62, -10, 0),
+            (-0.09, 0.02, -0.11, 0.20, 44, -10, 4),
+            (0.0, 0.40, -0.08, 0.31, 28, -8, 6),
+            (0.09, 0.60, -0.03, 0.52, 14, 0, 4),
+            (0.18, 0.60, 0.00, 0.60, 2, 4, 0),
+            (0.38, 0.34, -0.06, 0.34, 4, -2, 0),
+            (0.56, 0.10, -0.11, 0.13, 2, -8, 0),
+        ),
+        hips=(
+            (-0.8, 0, 0, 0),
+            (-0.46, -0.02, 0.06, 0.015),
+            (0.0, 0.03, 0.075, 0.03),
+            (0.4, 0.02, 0.06, 0.015),
+            (1.0, 0, 0, 0),
+        ),
+        pelvis=(
+            (-0.5, 0, 2, -8),
+            (-0.2, 2, 5, -18),
+            (0.0, -3, -6, 6),
+            (0.18, -3, -10, 14),
+            (0.5, 0, -2, 6),
+            (1.0, 0, 0, 0),
+        ),
+        spine=(
+            (-0.5, 0, 6, 8),
+            (-0.2, -4, 4, 20),
+            (0.0, -5, 14, -4),
+            (0.18, -3, 20, -14),
+            (0.5, 0, 8, -4),
+            (1.0, 0, 2, 0),
+        ),
+        head=((-0.6, -6, 0), (-0.1, 16, 0), (0.05, 18, 0), (0.4, -8, 0), (1.0, 0, 0)),
+        left_arm=(
+            (-0.6, 4, 16, 12, 22),
+            (-0.2, -16, 52, 5, 26),
+            (0.02, 24, 52, 16, 34),
+            (0.2, 44, 34, 28, 42),
+            (1.0, 2, 10, 12, 16),
+        ),
+        right_arm=(
+            (-0.6, 4, 16, 12, 22),
+            (-0.2, 24, 28, 20, 40),
+            (0.02, -16, 38, 10, 32),
+            (0.2, -30, 36, 5, 26),
+            (1.0, 2, 10, 12, 16),
+        ),
+    ),
+    "attack": Volley(
+        words="kick right high top standing front attack",
+        span=(-0.85, 1.1),
+        foot=(
+            (-0.44, -0.14, -0.15, 0.15, 30, -10, 0),
+            (-0.24, -0.42, -0.24, 0.46, 80, -22, 0),
+            (-0.10, -0.04, -0.32, 0.50, 66, -24, 10),
+            (0.0, 0.48, -0.20, 0.66, 40, -8, 16),
+            (0.07, 0.68, 0.02, 0.82, 28, 14, 14),
+            (0.16, 0.60, 0.18, 0.84, 14, 26, 6),
+            (0.38, 0.36, 0.02, 0.46, 4, 10, 0),
+            (0.60, 0.12, -0.10, 0.14, 2, -6, 0),
+        ),
+        hips=(
+            (-0.85, 0, 0, 0),
+            (-0.48, -0.03, 0.065, 0.02),
+            (0.0, 0.02, 0.085, 0.035),
+            (0.2, 0.0, 0.08, 0.01),
+            (0.5, 0.0, 0.06, 0.01),
+            (1.1, 0, 0, 0),
+        ),
+        pelvis=(
+            (-0.5, 0, 2, -12),
+            (-0.22, 3, 8, -34),
+            (0.0, -8, -12, 8),
+            (0.16, -8, -18, 26),
+            (0.5, -1, -4, 10),
+            (1.1, 0, 0, 0),
+        ),
+        spine=(
+            (-0.5, 0, 6, 12),
+            (-0.22, -6, 2, 38),
+            (0.0, -14, 10, -2),
+            (0.16, -8, 22, -26),
+            (0.5, -1, 10, -8),
+            (1.1, 0, 2, 0),
+        ),
+        head=((-0.6, -8, 0), (-0.1, 4, 0), (0.08, 8, 0), (0.45, -4, 0), (1.1, 0, 0)),
+        left_arm=(
+            (-0.6, 4, 18, 12, 22),
+            (-0.22, -26, 78, 0, 20),
+            (0.02, 28, 66, 16, 30),
+            (0.2, 56, 34, 36, 42),
+            (0.6, 20, 22, 16, 30),
+            (1.1, 2, 10, 12, 16),
+        ),
+        right_arm=(
+            (-0.6, 4, 18, 12, 22),
+            (-0.22, 34, 30, 24, 46),
+            (0.02, -24, 48, 8, 32),
+            (0.2, -42, 42, 0, 24),
+            (0.6, -8, 24, 12, 24),
+            (1.1, 2, 10, 12, 16),
+        ),
+    ),
+    "receive": Volley(
+        words="receive right foot low inside standing front",
+        span=(-0.75, 0.95),
+        foot=(
+            (-0.28, 0.10, -0.13, 0.14, 4, -40, 0),
+            (-0.10, 0.32, -0.13, 0.155, -6, -66, -6),
+            (0.0, 0.34, -0.13, 0.150, -6, -70, -6),
+            (0.20, 0.16, -0.13, 0.130, -2, -68, -4),
+            (0.40, 0.08, -0.12, 0.110, 2, -40, 0),
+        ),
+        hips=(
+            (-0.75, 0, 0, 0),
+            (-0.38, 0.0, 0.06, 0.03),
+            (0.0, -0.01, 0.075, 0.045),
+            (0.3, 0.0, 0.06, 0.04),
+            (0.95, 0, 0, 0),
+        ),
+        pelvis=((-0.4, 1, 2, -4), (0.0, 0, 0, -2), (0.25, 0, 2, -10), (0.95, 0, 0, 0)),
+        spine=((-0.4, 0, 9, 4), (0.0, -2, 12, 0), (0.25, 0, 14, 6), (0.95, 0, 2, 0)),
+        head=((-0.6, 4, 0), (0.0, 26, 0), (0.4, 26, 0), (0.95, 0, 0)),
+        left_arm=((-0.5, 8, 24, 12, 28), (0.0, 14, 42, 15, 40), (0.3, 10, 36, 15, 42), (0.95, 2, 10, 12, 16)),
+        right_arm=((-0.5, 8, 24, 12, 28), (0.0, -6, 40, 15, 38), (0.3, 4, 34, 15, 40), (0.95, 2, 10, 12, 16)),
+    ),
+    "head": Volley(
+        words="header standing front",
+        span=(-0.85, 0.95),
+        hips=(
+            (-0.85, 0, 0, 0),
+            (-0.30, -0.03, 0, 0.07),
+            (-0.1, -0.01, 0, 0.03),
+            (0.0, 0.04, 0, 0.0),
+            (0.2, 0.05, 0, 0.02),
+            (0.95, 0, 0, 0),
+        ),
+        pelvis=((-0.6, 0, 2, 0), (-0.28, 0, -8, 0), (0.0, 0, 2, 0), (0.2, 0, 8, 0), (0.95, 0, 0, 0)),
+        spine=((-0.6, 0, 4, 0), (-0.26, 0, -18, 0), (0.0, 0, 6, 0), (0.18, 0, 18, 0), (0.95, 0, 2, 0)),
+        head=((-0.6, -12, 0), (-0.26, -20, 0), (0.0, 6, 0), (0.14, 10, 0), (0.5, -6, 0), (0.95, 0, 0)),
+        left_arm=(
+            (-0.6, 10, 20, 14, 30),
+            (-0.28, 40, 46, 24, 62),
+            (0.0, 0, 42, 20, 70),
+            (0.25, 4, 34, 18, 52),
+            (0.95, 2, 10, 12, 16),
+        ),
+        right_arm=(
+            (-0.6, 10, 20, 14, 30),
+            (-0.28, 40, 46, 24, 62),
+            (0.0, 0, 42, 20, 70),
+            (0.25, 4, 34, 18, 52),
+            (0.95, 2, 10, 12, 16),
+        ),
+    ),
+    "chest": Volley(
+        words="receive body standing front",
+        span=(-0.75, 0.95),
+        hips=((-0.75, 0, 0, 0), (-0.25, 0.02, 0, 0.05), (0.0, 0.07, 0, 0.06), (0.2, 0.05, 0, 0.05), (0.95, 0, 0, 0)),
+        pelvis=((-0.5, 0, 0, 0), (0.0, 0, -12, 0), (0.22, 0, -6, 0), (0.95, 0, 0, 0)),
+        spine=((-0.5, 0, 0, 0), (-0.05, 0, -20, 0), (0.2, 0, -2, 0), (0.95, 0, 2, 0)),
+        head=((-0.5, -6, 0), (0.0, 22, 0), (0.3, 34, 0), (0.95, 0, 0)),
+        left_arm=((-0.5, 4, 20, 10, 24), (0.0, -10, 62, 0, 50), (0.25, 0, 50, 5, 46), (0.95, 2, 10, 12, 16)),
+        right_arm=((-0.5, 4, 20, 10, 24), (0.0, -10, 62, 0, 50), (0.25, 0, 50, 5, 46), (0.95, 2, 10, 12, 16)),
+    ),
+    "hand": Volley(
+        words="hand volley standing front",
+        span=(-1.3, 1.2),
+        hips=((-1.3, 0, 0, 0), (-0.25, -0.02, 0, 0.09), (0.0, 0.03, 0, 0.0), (0.25, 0.03, 0, 0.0), (1.0, 0, 0, 0)),
+        pelvis=((-0.5, 0, 2, 0), (-0.2, 0, 4, -6), (0.0, 0, -2, 4), (0.25, 0, 0, 6), (1.0, 0, 0, 0)),
+        spine=((-0.5, 0, 4, 0), (-0.2, 0, -6, -8), (0.0, 0, 0, 4), (0.25, 0, 6, 6), (1.0, 0, 2, 0)),
+        head=((-0.6, -16, 0), (-0.1, -26, 0), (0.1, -18, 0), (0.5, -8, 0), (1.0, 0, 0)),
+        left_arm=(
+            (-1.2, 8, 12, 12, 30),
+            (-0.3, 100, 14, 20, 112),
+            (0.0, 118, 16, 16, 62),
+            (0.14, 128, 18, 14, 24),
+            (0.6, 70, 14, 14, 40),
+            (1.2, 2, 10, 12, 16),
+        ),
+        right_arm=(
+            (-1.2, 8, 12, 12, 30),
+            (-0.26, 92, 14, 20, 122),
+            (0.0, 124, 14, 18, 50),
+            (0.09, 132, 14, 14, 14),
+            (0.6, 70, 14, 14, 40),
+            (1.2, 2, 10, 12, 16),
+        ),
+        wrist=((-0.5, 8), (-0.15, -40), (0.06, 10), (0.5, 8)),
+    ),
+    "racquet": Volley(
+        words="stroke right standing front",
+        span=(-1.0, 1.2),
+        hips=(
+            (-1.0, 0, 0, 0),
+            (-0.45, -0.04, -0.05, 0.05),
+            (0.0, 0.04, 0.05, 0.05),
+            (0.3, 0.05, 0.06, 0.03),
+            (1.2, 0, 0, 0),
+        ),
+        pelvis=(
+            (-0.9, 0, 2, 0),
+            (-0.45, 0, 4, -34),
+            (-0.12, 0, 4, -16),
+            (0.0, 0, 3, 2),
+            (0.25, 0, 2, 26),
+            (1.2, 0, 0, 0),
+        ),
+        spine=(
+            (-0.9, 0, 5, 0),
+            (-0.45, 0, 8, -38),
+            (-0.12, 2, 8, -24),
+            (0.0, 2, 8, 4),
+            (0.25, 0, 8, 30),
+            (1.2, 0, 2, 0),
+        ),
+        head=((-0.8, -2, 0), (-0.45, 2, 50), (0.0, 6, 4), (0.25, 2, -36), (1.2, 0, 0)),
+        left_arm=(
+            (-0.8, 40, 16, 20, 60),
+            (-0.45, 64, 20, 40, 50),
+            (0.0, 34, 36, 24, 64),
+            (0.3, 20, 24, 30, 78),
+            (1.2, 2, 10, 12, 16),
+        ),
+        right_arm=(
+            (-0.8, 30, 14, 20, 70),
+            (-0.45, -30, 62, -20, 54),
+            (-0.14, -26, 50, -24, 44),
+            (0.0, 24, 44, 0, 32),
+            (0.14, 70, 36, 26, 40),
+            (0.34, 96, 18, 50, 82),
+            (0.7, 50, 14, 30, 60),
+            (1.2, 2, 10, 12, 16),
+        ),
+    ),
+}  # fmt: skip
+
+
+def volley(
+    kind: str, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
+    example: Motion | None = None,
+) -> Gesture:
+    """A strike out of standing with the right side, facing +X: `kind` is one of VOLLEYS. speed: factor on how fast the
+    strike's rows are gone through. example: a recording of the skeleton, for its neutral stance."""
+    recipe = VOLLEYS[kind]
+    neutral = neutral_stance(skeleton or adult_skeleton(), example)
+    course, posture = _ready(neutral, BEFORE + AFTER, fps, seed)
+    times = (course.times - BEFORE) * speed
+    begin, end = recipe.span
+    ease = envelope(times, begin, 0.6 * begin, 0.55 * end, end)
+    posture = _trunk_and_arms(posture, recipe, times, ease, neutral)
+    posture = with_feet(posture, course.times, _still(course, neutral), neutral)
+    if recipe.foot is not None:
+        posture = _led_foot(posture, recipe.foot, times, neutral)
+    return Gesture(
+        to_motion(posture.frames(course.asked), neutral), BEFORE, BEFORE + begin / speed, BEFORE + end / speed
+    )
+
+
+def idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
+    """Standing ready for a ball: knees a little bent, the weight going from foot to foot, feet where they are."""
+    neutral = neutral_stance(skeleton or adult_skeleton())
+    course, posture = _ready(neutral, duration, fps, seed)
+    posture = with_feet(posture, course.times, _still(course, neutral), neutral)
+    return to_motion(posture.frames(course.asked), neutral)
+
+
+def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Course, Posture]:
+    """Standing for `duration` seconds with the knees bent and the weight shifted to and fro."""
+    course, _, posture = standing_posture(neutral, duration, fps, seed)
+    scale, times = neutral.leg / tables.LEG, course.times
+    phase = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 3)
+    sway = 0.020 * np.sin(2.0 * np.pi * times / 4.3 + phase[0]) + 0.008 * np.sin(2.0 * np.pi * times / 1.9 + phase[1])
+    turn = np.radians(3.0) * np.sin(2.0 * np.pi * times / 5.1 + phase[2])
+    nothing = np.zeros_like(times)
+    hips = posture.hips + scale * np.stack([nothing, sway, nothing - _BENT], axis=-1)
+    lean = np.stack([-1.5 * sway, nothing + np.radians(4.0), turn], axis=-1)
+    spine = posture.spine + np.stack([1.5 * sway, nothing + np.radians(5.0), -0.5 * turn], axis=-1)
+    head = posture.head + np.stack([nothing, nothing - np.radians(7.0), -0.5 * turn], axis=-1)
+    return course, posture.changed(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
+
+
+def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, Footsteps]:
+    """Both feet on the ground all the time."""
+    return tuple(walked_steps(course, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
+
+
+def _trunk_and_arms(posture: Posture, recipe: Volley, times, ease, neutral: Neutral) -> Posture:
+    """The posture with the recipe's trunk, head and arms laid over it by `ease` (T,), its hips moved."""
+    scale = neutral.leg / tables.LEG
+    moved = scale * ease[:, None] * keyed(recipe.hips, times)
+    hips = posture.hips + moved * [1.0, 1.0, -1.0]
+    nothing = np.zeros_like(times)
+    nod = np.radians(keyed(recipe.head, times))
+    head = posture.head + ease[:, None] * np.stack([nothing, nod[:, 0], nod[:, 1]], axis=-1)
+    lean = {
+        name: getattr(posture, name) + ease[:, None] * np.radians(keyed(getattr(recipe, name), times))
+        for name in ("pelvis", "spine")
+    }
+    arms, wrists = posture.arms.copy(), posture.wrists.copy()
+    for side, rows in enumerate((recipe.left_arm, recipe.right_arm)):
+        arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), ease)
+    wrists[:, RIGHT] = mixed(wrists[:, RIGHT], np.radians(keyed(recipe.wrist, times))[:, 0], ease)
+    return posture.changed(hips=hips, head=head, arms=arms, wrists=wrists, **lean)
+
+
+def _led_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: Neutral) -> Posture:
+    """The right foot led from where it stands through `rows` and back, never through the ground nor beyond its leg."""
+    scale, table = neutral.leg / tables.LEG, np.array(rows, dtype=float)
+    begin, land = table[0, 0] - 0.16, table[-1, 0] + 0.14
+    inside = (times > begin) & (times < land)
+    edges = [np.flatnonzero(inside)[0] - 1, np.flatnonzero(inside)[-1] + 1]
+    rest = np.column_stack([posture.ankles[:, RIGHT], posture.feet[:, RIGHT]])
+    middle = posture.hips[edges[0]] * [1.0, 1.0, 0.0]
+    led = np.column_stack([table[:, 1:4] * scale + middle, np.radians(table[:, [6, 4, 5]])])
+    through = np.concatenate([rest[edges[:1]], led, rest[edges[1:]]])
+    at = np.concatenate([times[edges[:1]], table[:, 0], times[edges[1:]]])
+    path = CubicSpline(at, through, axis=0, bc_type="clamped")(times[inside])
+    ankles, feet = posture.ankles.copy(), posture.feet.copy()
+    raised = np.sqrt(np.maximum(np.sin(np.pi * (times[inside] - begin) / (land - begin)), 0.0))
+    path[:, 2] += raised * lift_off_ground(path[:, 2], path[:, 4], neutral)
+    hip = hip_joints(posture, neutral)[inside, RIGHT]
+    ankles[inside, RIGHT] = hip + _within(path[:, :3] - hip, sum(thigh_shank(neutral, RIGHT)))
+    feet[inside, RIGHT] = path[:, 3:]
+    return posture.changed(ankles=ankles, feet=feet)
+
+
+def _within(away: np.ndarray, leg: float) -> np.ndarray:
+    """Ways (T, 3) m from hip to ankle no longer than a leg nearly stretched, neared softly."""
+    far = np.linalg.norm(away, axis=1)
+    begin = (_STRAIGHTEST - _EASE) * leg
+    eased = begin + _EASE * leg * np.tanh((far - begin) / (_EASE * leg))
+    return away * np.where(far < begin, 1.0, eased / np.maximum(far, 1e-9))[:, None]

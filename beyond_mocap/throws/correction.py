@@ -1,0 +1,348 @@
+"""A throw or kick made to hit: the smallest change of a motion with which the ball, as it leaves, flies to its target.
+
+A ball in the hand has the hand's velocity when it leaves; a ball that lies gets its own from the foot that meets it
+(`struck`). Both follow from the motion alone, between frames too (`motion.between_frames`), so a ball that is to fly
+elsewhere asks for another motion. What people change when they aim comes first and costs little: the body turns, the
+ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. What is left is a
+small smooth shift of the wrist or ankle about that instant (`shift`), which the arm or leg follows by inverse
+kinematics. Among all changes with which the ball hits, with drag, lift and gravity as in `ball.physics`, the one that
+costs least is found by Newton's method with Lagrange's multipliers; the release is looked for on a grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..motion import quaternion
+from ..motion.between_frames import cubic_at
+from ..motion.motion import Motion, forward_kinematics, place
+from ..ball import batch
+from ..ball.physics import Ball
+from .led_limb import Hold, LedLimb, at_once
+from .letting_go import AtFoot, InHand, carried, grip_point
+from .shift import shifts_about
+
+FINE, LITTLE = 0.02, 0.05
+"""m of miss and of moved wrist up to which the pace is left as it is."""
+CLOSE = 1e-3
+"""m from the target at which nothing more is changed."""
+# What costs as much as a metre of moved wrist: radians of turning, share of pace, seconds of release, m/s of speed
+# that is asked for and of speed that is not, metres of ball.
+_TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
+_ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
+_LOOKS, _TRIED = 4, 2
+_LEAST_STEP = 0.05  # of what the slopes say, below which nothing more comes of it
+# m of miss after which, and the rounds after which, little more than contortions comes of it
+_FAR, _FAR_ROUNDS = 1.0, 4
+_STEP = 1e-3  # of frames, metres, m/s and radians, in differences
+_LEAST = 3  # frames that a motion needs before and after the release
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """What may be changed beside wrist or ankle: turn rad about the start, pace as a share, release s, each to either
+    side. elsewhere: whether the body may begin elsewhere, so that its foot finds a ball whose place is given."""
+
+    turn: float = np.radians(15.0)
+    pace: float = 0.15
+    release: float = 0.02
+    elsewhere: bool = True
+
+    @classmethod
+    def anchored(cls) -> Freedom:
+        """For a motion that is joined to others before and behind: it keeps its place, its facing and its frames."""
+        return cls(0.0, 0.0, 0.02, False)
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """A motion whose ball hits.
+
+    frame: fractional, at which the ball leaves. position (3,) m, velocity (3,) m/s, spin (3,) rad/s of the ball then.
+    seconds: until it is at the target, and miss: m that it passes by. moved: m that the wrist or ankle was moved at
+    most, by `shift` (T, 3) m at each frame; turned: rad that the body was turned about its start; pace: the factor on
+    its speed; later: s that the ball leaves after it would have at that pace; elsewhere: m that the body begins
+    beside where it began. gap: m between foot and ball, 0 for throws.
+    """
+
+    motion: Motion
+    frame: float
+    position: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+    seconds: float
+    miss: float
+    moved: float
+    shift: np.ndarray
+    turned: float
+    pace: float
+    later: float
+    elsewhere: float = 0.0
+    gap: float = 0.0
+
+    @property
+    def missed(self) -> float:
+        """m in all, past the target and between foot and ball."""
+        return self.miss + self.gap
+
+
+def corrected(
+    motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball,
+    freedom: Freedom | None = None, speed: float | None = None, hold: Hold | None = None,
+) -> Corrected:
+    """The motion changed so that the ball leaves it about the fractional `frame` and flies through `target` (3,) m.
+
+    speed: m/s wished for as it leaves; it gives way where the body's own is far from it. hold: what keeps the limb's
+    joints within their limits; where that leaves no way to the target the ball misses. InputError: a body without that
+    limb, a release at the motion's very ends, a target where the ball is.
+    """
+    freedom = freedom or Freedom()
+    target = np.maximum(np.asarray(target, float), [-np.inf, -np.inf, ball.radius])
+    part.chain(motion)
+    if not _LEAST <= frame <= len(motion) - 1 - _LEAST:
+        raise InputError("release", f"frame {frame:.1f} of {len(motion)}", f"at least {_LEAST} frames before and after")
+    return _Search(motion, part, float(frame), target, ball, freedom, speed, hold).whole()
+
+
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """What is changed in all: place (3,) m and velocity (3,) m/s of the part at the release, turn rad, pace as a share,
+    rest (F,) m of the ball against the body, one of which stays where it is; seconds: until it arrives. As one row (9
+    + F,)."""
+
+    row: np.ndarray
+
+    @classmethod
+    def none(cls, free: int, seconds: float) -> _Change:
+        row = np.zeros(9 + free)
+        row[-1] = seconds
+        return cls(row)
+
+    place = property(lambda self: self.row[0:3])
+    velocity = property(lambda self: self.row[3:6])
+    turn = property(lambda self: float(self.row[6]))
+    pace = property(lambda self: float(self.row[7]))
+    rest = property(lambda self: np.append(self.row[8:-1], np.zeros(3 - (len(self.row) - 9))))
+    seconds = property(lambda self: float(self.row[-1]))
+
+
+class _Search:
+    """One correction. `frame`: of the motion as it was given."""
+
+    def __init__(self, motion, part, frame, target, ball, freedom: Freedom, speed, hold):
+        self.given, self.part, self.asked = motion, part, frame
+        self.target, self.ball, self.freedom, self.speed, self.hold = target, ball, freedom, speed, hold
+        self.pivot = motion.root_positions[0] * [1.0, 1.0, 0.0]
+        self.bounds = np.zeros(2)
+        self.walks = freedom.elsewhere and not part.free and isinstance(part, AtFoot)
+        self.free = 2 if self.walks else part.free
+        self._rigid = (6, 7, 8, 9) if self.walks else (6, 7)
+
+    def whole(self) -> Corrected:
+        """First what costs little, then what is left; the pace is changed only where it has to be."""
+        tried = []
+        for pace in (0.0, self.freedom.pace):
+            self.bounds = np.array([self.freedom.turn, pace])
+            start = self._start(self.asked)
+            for change, source in self._promising(start)[:_TRIED]:
+                tried.append(self._hit(change, source, start))
+                if tried[-1].missed < FINE and tried[-1].moved < LITTLE:
+                    return tried[-1]
+            if not self.freedom.pace:
+                break
+        return min(tried, key=lambda found: found.missed + 0.2 * found.moved)
+
+    def _promising(self, start) -> list[tuple[_Change, float]]:
+        """Changes of what costs little, and their releases; the one that leaves least to be moved first. Slopes lead
+        astray where a foot meets a ball, so each is judged by where it really leads."""
+        now = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
+        found = []
+        for _ in range(_LOOKS if isinstance(self.part, AtFoot) else 2):
+            now = self._looked(*now, start)
+            found.append((self._left_over(*now, start), len(found), now))
+        return [each for _, _, each in sorted(found, key=lambda one: one[:2])]
+
+    def _left_over(self, change: _Change, source: float, start) -> float:
+        """What moving the limb would still cost."""
+        motion, frame = self._moved(change), source / (1.0 + change.pace)
+        points, velocities = carried(self.part, motion, np.array([frame]))
+        costs = self._cost(motion, frame), at_once(points.shape[1])
+        rest = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
+        rows, _ = self._best(points, velocities, rest, start, *costs, fixed=self._rigid)
+        return sum(float(pair @ costs[0] @ pair) for pair in rows[0, :6].reshape(2, 3).T)
+
+    def _start(self, frame: float) -> np.ndarray:
+        return self.part.rest(self.given, frame, self.target, self.ball)
+
+    def _seconds(self, motion: Motion, frame: float, rest) -> float:
+        """s until a ball that is not slowed is as far as the target."""
+        points, velocities = carried(self.part, motion, np.array([frame]))
+        position, velocity, _, _ = self.part.leaves(points, velocities, rest[None], self.ball)
+        way = (self.target - position[0]) * [1.0, 1.0, 0.0]
+        far = float(np.linalg.norm(self.target - position[0]))
+        if far < 4.0 * self.ball.radius:
+            found = f"{far:.2f} m from where the ball leaves"
+            raise InputError("target", found, "a target some way off", "move it away")
+        along = max(float(velocity[0] @ way) / max(np.linalg.norm(way), 1e-9), 0.3 * np.linalg.norm(velocity[0]), 1.0)
+        return float(np.clip(1.05 * far / along, 0.05, 4.0))
+
+    def _moved(self, change: _Change) -> Motion:
+        """The motion turned and at its pace."""
+        motion = self.given
+        if change.pace:
+            frames = np.arange(int(np.floor((len(motion) - 1) / (1.0 + change.pace))) + 1) * (1.0 + change.pace)
+            root, rotations = cubic_at(motion, frames)
+            motion = Motion(motion.skeleton, root, rotations, motion.fps)
+        if change.turn:
+            turned = self.pivot - quaternion.rotate(quaternion.about_up(np.array(change.turn)), self.pivot)
+            motion = place(motion, change.turn, turned)
+        return place(motion, 0.0, -change.rest) if self.walks else motion
+
+    def _looked(self, change: _Change, source: float, start) -> tuple[_Change, float]:
+        """Turn, pace and release that leave least to be moved: all releases on a grid, each with the change that is
+        best by the slopes there."""
+        motion = self._moved(change)
+        within = self.freedom.release * self.given.fps
+        sources = np.clip(self.asked + np.linspace(-within, within, _GRID), _LEAST, len(self.given) - 1 - _LEAST)
+        points, velocities = carried(self.part, motion, sources / (1.0 + change.pace))
+        now = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
+        cost = self._cost(motion, source / (1.0 + change.pace))
+        rows, cost = self._best(points, velocities, now, start, cost, at_once(points.shape[1]))
+        cost = cost + ((sources - self.asked) / self.given.fps * _LATER) ** 2
+        best = int(np.argmin(cost))
+        return _Change(rows[best]), float(sources[best])
+
+    def _hit(self, change: _Change, source: float, start) -> Corrected:
+        """Newton's steps with the arm or leg as it follows; the best of them."""
+        motion = self._moved(change)
+        frame = source / (1.0 + change.pace)
+        limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps), self.hold)
+        best, base, step = None, change, 1.0
+        follows, known = at_once(grip_point(motion, self.part, np.array([frame])).shape[1]), False
+        for number in range(_ROUNDS):
+            now = limb.shifted(change.row[:6])
+            points, velocities = carried(self.part, now, np.array([frame]))
+            found = self._judged(motion, now, frame, source, change, start, points, velocities)
+            better = best is None or found.missed < best.missed
+            slow = best is not None and found.missed > 0.1 * best.missed
+            if better:
+                best, base, there = found, change, (points, velocities)
+            step = 1.0 if better else 0.4 * step
+            if best.missed < CLOSE or step < _LEAST_STEP or number >= _FAR_ROUNDS and best.missed > _FAR:
+                break
+            if slow and (better or not known):
+                follows, known = limb.follows(base.row[:6], frame, *there), True
+            if better or slow:
+                costs = limb.shifts.cost, follows
+                rows, _ = self._best(*there, base, start, *costs, fixed=self._rigid, near=number >= _FREE_ROUNDS)
+            change = _Change(base.row + step * (rows[0] - base.row))
+        return best
+
+    def _span(self, motion: Motion, frame: float) -> tuple[int, int]:
+        first, last = self.part.span(motion, frame)
+        return max(first, 1), min(last, len(motion) - 2)
+
+    def _cost(self, motion: Motion, frame: float) -> np.ndarray:
+        return shifts_about(frame, *self._span(motion, frame), motion.fps).cost
+
+    def _arrives(self, points, velocities, turn, pace, rest, seconds):
+        """Where the balls (B) are (B, 3) m, their gaps (B, G) and their speeds (B,), for parts turned by `turn` (B,)
+        rad and faster by the share `pace` (B,)."""
+        about = quaternion.about_up(turn)[:, None]
+        points = quaternion.rotate(about, points - self.pivot) + self.pivot
+        velocities = quaternion.rotate(about, velocities) * (1.0 + pace)[:, None, None]
+        position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
+        count = np.zeros(len(position), int)  # in the air, even below the ground: slopes go on there
+        balls = batch.Balls(position.copy(), velocity, np.array(spin), count, count)
+        there = batch.after(balls, self.ball, np.maximum(seconds, 1e-3), most_bounces=0).position
+        return there, gap, np.linalg.norm(velocity, axis=-1)
+
+    def _best(
+        self, points, velocities, now: _Change, start, cost, follows, fixed=(), near=False
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Changes (N, 9 + F) in all, and what they cost (N,), of parts at N releases, of which `now` is changed
+        already: the least with which the ball would hit if all went on along its slopes. near: the least away from
+        `now` instead, which comes to the target where the slopes do not hold for long."""
+        short, slopes, speed, faster = self._slopes(points, velocities, now, start, follows)
+        count, size = len(points), len(now.row)
+        weight = np.zeros((size, size))
+        for axis in range(3):
+            weight[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = cost
+        weight[6, 6], weight[7, 7] = 1.0 / _TURN**2, 1.0 / _PACE**2
+        weight[range(8, size - 1), range(8, size - 1)] = 1.0 / _REST**2
+        weight[-1, -1] = 1e-2 if near else 1e-9
+        wish, worth = (self.speed, 1.0 / _SPEED**2) if self.speed else (speed, 1.0 / _OWN_SPEED**2)
+        hessian = weight + worth * faster[:, :, None] * faster[:, None, :]
+        pull = worth * faster * (wish - speed + faster @ now.row)[:, None]
+        if near:
+            hessian, pull = np.tile(weight, (count, 1, 1)), np.tile(weight @ now.row, (count, 1))
+        level = slopes @ now.row - short
+        free = [i for i in range(size) if i not in set(fixed) and not (i in (6, 7) and not self.bounds[i - 6])]
+        rows = self._least(hessian, pull, slopes, level, np.tile(now.row, (count, 1)), free)
+        over = np.abs(rows[:, 6:8]) > self.bounds + 1e-12
+        if over.any() and not len(fixed):
+            rows[:, 6:8] = np.clip(rows[:, 6:8], -self.bounds, self.bounds)
+            again = self._least(hessian, pull, slopes, level, rows, [i for i in free if i not in (6, 7)])
+            rows = np.where(over.any(axis=1)[:, None], again, rows)
+        gone = np.einsum("ni,ij,nj->n", rows, weight, rows)
+        return rows, gone + worth * (speed + np.einsum("ni,ni->n", faster, rows - now.row) - wish) ** 2
+
+    @staticmethod
+    def _least(hessian, pull, slopes, level, rows, free) -> np.ndarray:
+        """Rows (N, S) with the entries `free` chosen: least u H u / 2 - pull u with slopes u = level."""
+        count, size, held = len(rows), len(free), slopes.shape[1]
+        rest = rows.copy()
+        rest[:, free] = 0.0
+        matrix = np.zeros((count, size + held, size + held))
+        matrix[:, :size, :size] = hessian[:, free][:, :, free]
+        matrix[:, size:, :size] = slopes[:, :, free]
+        matrix[:, :size, size:] = np.swapaxes(slopes[:, :, free], 1, 2)
+        matrix[:, range(size, size + held), range(size, size + held)] = -1e-12
+        right = np.concatenate([
+            (pull - np.einsum("nij,nj->ni", hessian, rest))[:, free],
+            level - np.einsum("nij,nj->ni", slopes, rest),
+        ], axis=1)  # fmt: skip
+        out = rest
+        out[:, free] = np.linalg.solve(matrix, right[:, :, None])[:, :size, 0]
+        return out
+
+    def _slopes(self, points, velocities, now: _Change, start, follows):
+        """What is missing (N, 3 + G) to target and contact, how it changes (N, 3 + G, S) with the change, the ball's
+        speed (N,) and how that changes (N, S). `points`, `velocities`: as `now` has made them; follows: see
+        `LedLimb`."""
+        count, size = len(points), len(now.row)
+        each = size + 1
+        nudge = _STEP * np.vstack([np.zeros(size), np.eye(size)])
+        nudge = np.tile(nudge, (count, 1))
+        spread = [np.repeat(value, each, axis=0) for value in (points, velocities)]
+        away = np.column_stack([nudge[:, 8:-1], np.zeros((len(nudge), 3 - (size - 9)))])
+        rest = start + (0.0 * away if self.walks else now.rest + away)
+        if self.walks:
+            spread[0] = spread[0] - away[:, None]
+        there, gap, speed = self._arrives(
+            *(value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows)), nudge[:, 6],
+            nudge[:, 7] / (1.0 + now.pace), rest, now.seconds + nudge[:, -1],
+        )  # fmt: skip
+        missing = np.concatenate([there - self.target, gap], axis=1).reshape(count, each, -1)
+        speed = speed.reshape(count, each)
+        slopes = np.swapaxes(missing[:, 1:] - missing[:, :1], 1, 2) / _STEP
+        return missing[:, 0], slopes, speed[:, 0], (speed[:, 1:] - speed[:, :1]) / _STEP
+
+    def _judged(self, before, now, frame, source, change, start, points, velocities) -> Corrected:
+        """What has come of it."""
+        rest = (start if self.walks else start + change.rest)[None]
+        position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
+        none = np.zeros(1)
+        there, _, _ = self._arrives(points, velocities, none, none, rest, np.array([change.seconds]))
+        end = self.part.chain(now)[2]
+        shift = forward_kinematics(now)[0][:, end] - forward_kinematics(before)[0][:, end]
+        return Corrected(
+            now, frame, position[0], velocity[0], spin[0], change.seconds,
+            float(np.linalg.norm(there[0] - self.target)), float(np.linalg.norm(shift, axis=-1).max()), shift,
+            change.turn, 1.0 + change.pace, (source - self.asked) / self.given.fps / (1.0 + change.pace),
+            float(np.linalg.norm(change.rest)) if self.walks else 0.0,
+            float(np.abs(gap).max(initial=0.0)),
+        )  # fmt: skip

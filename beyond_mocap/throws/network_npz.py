@@ -1,0 +1,216 @@
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays, with one
+JSON text for what is no array. Nothing in it is ever executed."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from dataclasses import asdict, fields
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..motion.motion import Motion
+from ..motion.skeleton import Skeleton
+from .networks.chains import EFFECTORS
+from .networks.example import Example
+from .networks.model import ModelSettings, ThrowModel
+from .networks.network import PhaseNetwork
+from ..files.content import content
+from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
+from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.whole import atomic_write
+
+VERSION = 1
+FORMAT = "Beyond Mocap throw model"
+LARGEST = 300_000_000
+"""Bytes of a file above which it is no model."""
+UNPACKED = 1_000_000_000
+"""Bytes of all its arrays together above which it is no model."""
+_KIND = "a file of weights (.npz)"
+_PAGE = "docs/throws/throws-training.md"
+_SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
+_BEYOND = ("before", "after")
+_OTHERS = {"told": "the checkpoint of a training"}
+_FLOATS = tuple(np.dtype(name) for name in ("<f2", "<f4", "<f8"))
+_ROWS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
+_EXAMPLE = ("name", "subject", "limb", "release", "impact", "launch", "stature")
+
+
+def read_model(path: str | os.PathLike) -> ThrowModel:
+    """The model that a file holds; float16 weights come as float32.
+
+    InputError, one line that begins with the file's name, for whatever is wrong: missing, cut short, of something else,
+    a value that is no number, shapes that do not fit.
+    """
+    data = content(path, _KIND, LARGEST)
+    try:
+        arrays = plain_arrays(data, _KIND, _FLOATS, UNPACKED, _OTHERS)
+        half = np.dtype("<f2")
+        return _model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+
+
+def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) -> None:
+    """Write a model as `read_model` reads it, number for number; the same model gives the same bytes.
+
+    half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights
+    that are shipped. InputError where it cannot be written, or where a weight is too large for float16.
+    """
+    arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
+    arrays |= _body_out(model) | _networks_out(model) | _examples_out(model)
+    if half:
+        arrays = {name: one if name == HEADER else _halved(name, one) for name, one in arrays.items()}
+    whole = io.BytesIO()
+    np.savez_compressed(whole, **arrays)
+    atomic_write(path, whole.getvalue())
+
+
+# -- writing
+
+
+def _header(model: ThrowModel) -> dict:
+    skeleton = model.skeleton
+    return {
+        "format": FORMAT, "version": VERSION, "settings": asdict(model.settings),
+        "skeleton": {"names": list(skeleton.names), "parents": list(skeleton.parents),
+                     "end_parents": list(skeleton.end_parents)},
+        "stature": float(model.stature), "leg_reach": {side: list(pair) for side, pair in model.leg_reach.items()},
+        "trained_on": model.trained_on, "notes": list(model.notes),
+        "examples": [_example_out(example) for example in model.examples],
+    }  # fmt: skip
+
+
+def _example_out(example: Example) -> dict:
+    return {
+        "name": example.name, "subject": example.subject, "limb": int(example.limb), "release": float(example.release),
+        "impact": [float(one) for one in example.impact],
+        "launch": None if example.launch is None else [float(one) for one in example.launch],
+        "stature": float(example.stature),
+    }  # fmt: skip
+
+
+def _body_out(model: ThrowModel) -> dict:
+    out = {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
+    return out | {name: value for name in ("joint_limits", "reference") if (value := getattr(model, name)) is not None}
+
+
+def _networks_out(model: ThrowModel) -> dict:
+    out = {}
+    for name, network in model.networks.items():
+        for layer, (weight, bias) in enumerate(zip(network.weights, network.biases)):
+            out |= {f"{name}/weights/{layer}": weight, f"{name}/biases/{layer}": bias}
+        out |= {f"{name}/{scale}": getattr(network, scale) for scale in _SCALES}
+    return out
+
+
+def _examples_out(model: ThrowModel) -> dict:
+    out = {}
+    for i, example in enumerate(model.examples):
+        out |= {f"examples/{i}/root": example.motion.root_positions, f"examples/{i}/turns": example.motion.rotations}
+        beyond = {side: getattr(example, side) for side in _BEYOND}
+        out |= {f"examples/{i}/{side}": places for side, places in beyond.items() if places is not None}
+    return out
+
+
+def _halved(name: str, values: np.ndarray) -> np.ndarray:
+    """float16 where little hangs on the last digits, else float32."""
+    if not ("/weights/" in name or name.endswith("/turns")):
+        return values.astype(np.float32)
+    if np.abs(values).max(initial=0.0) > np.finfo(np.float16).max:
+        raise InputError(name, "a weight above 65504", "weights that float16 holds", "write it without half")
+    return values.astype(np.float16)
+
+
+# -- reading
+
+
+def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
+    """The model that arrays make; every array is used once, none is left over."""
+    header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise InputError(HEADER, "no throw model", _KIND, "choose another file")
+    if header.get("version") != VERSION:
+        raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
+    check_names(header, HEADER, _ROWS, _ROWS)
+    settings = _settings(header["settings"])
+    skeleton = _skeleton(header["skeleton"], arrays)
+    networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
+    rows = entries(header["examples"], "examples")
+    model = ThrowModel(
+        settings, skeleton, networks, _reach(header["leg_reach"]),
+        tuple(_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
+        number(header["stature"], "stature"), arrays.pop("joint_limits", None), arrays.pop("reference", None),
+        text(header["trained_on"], "trained_on"),
+        tuple(text(one, "notes") for one in entries(header["notes"], "notes")),
+    )  # fmt: skip
+    if arrays:
+        raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
+    return model
+
+
+def _settings(row) -> ModelSettings:
+    names = [field.name for field in fields(ModelSettings)]
+    check_names(row, "settings", names, [name for name in names if name not in ("guided", "carried")])
+    return ModelSettings(**row)
+
+
+def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
+    known = ("names", "parents", "end_parents")
+    check_names(row, "skeleton", known, known)
+    names = [text(one, "skeleton: names") for one in entries(row["names"], "skeleton: names")]
+    parents = [whole_number(one, "skeleton: parents") for one in entries(row["parents"], "skeleton: parents")]
+    ends = [whole_number(one, "skeleton: end_parents") for one in entries(row["end_parents"], "skeleton: end_parents")]
+    if not all(0 <= end < len(names) for end in ends):
+        raise InputError("skeleton: end_parents", shown(ends), f"joints 0 to {len(names) - 1}")
+    offsets, end_offsets = _taken(arrays, "offsets", (len(names), 3)), _taken(arrays, "end_offsets", (len(ends), 3))
+    return Skeleton(names, parents, offsets, ends, end_offsets)
+
+
+def _reach(row) -> dict[str, tuple]:
+    check_names(row, "leg_reach", ("left", "right"), ("left", "right"))
+    return {side: numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side, pair in row.items()}
+
+
+def _network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetwork:
+    weights = tuple(_taken(arrays, f"{name}/weights/{layer}") for layer in range(layers))
+    biases = tuple(_taken(arrays, f"{name}/biases/{layer}") for layer in range(layers))
+    try:
+        return PhaseNetwork(weights, biases, *(_taken(arrays, f"{name}/{scale}") for scale in _SCALES))
+    except InputError as error:
+        raise InputError(name, str(error)) from None
+
+
+def _example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str, np.ndarray]) -> Example:
+    where = f"example {i + 1}"
+    check_names(row, where, _EXAMPLE, _EXAMPLE)
+    root, turns = _taken(arrays, f"examples/{i}/root"), _taken(arrays, f"examples/{i}/turns")
+    limb = whole_number(row["limb"], f"{where}: limb")
+    if not 0 <= limb < len(EFFECTORS):
+        raise InputError(f"{where}: limb", str(limb)[:40], "0 to 3")
+    if turns.ndim != 3 or turns.shape[2] != 4 or not len(turns) or np.any(np.sum(np.square(turns), axis=-1) < 0.5):
+        raise InputError(f"{where}: turns", f"shape {turns.shape}", "(T, J, 4) unit quaternions")
+    beyond = {side: arrays.pop(f"examples/{i}/{side}", None) for side in _BEYOND}
+    for side, places in beyond.items():
+        if places is not None and (places.ndim != 3 or places.shape[1:] != (4, 3)):
+            raise InputError(f"{where}: {side}", f"shape {places.shape}", "(N, 4, 3)")
+    launch = row["launch"]
+    return Example(
+        name=text(row["name"], f"{where}: name"), subject=text(row["subject"], f"{where}: subject"),
+        motion=Motion(skeleton, root, turns, fps), limb=limb, release=number(row["release"], f"{where}: release"),
+        impact=np.array(numbers(row["impact"], f"{where}: impact", 3, "[x, y, z] in metres")),
+        launch=None if launch is None else np.array(numbers(launch, f"{where}: launch", 3, "[x, y, z] in m/s or null")),
+        stature=number(row["stature"], f"{where}: stature"), **beyond,
+    )  # fmt: skip
+
+
+def _taken(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...] | None = None) -> np.ndarray:
+    """An array out of those that are left, which it leaves. InputError where it is missing or has another shape."""
+    array = arrays.pop(name, None)
+    if array is None:
+        raise InputError("the arrays", f"no {name!r}", f"those of {_PAGE}", "copy it again or choose another file")
+    if shape is not None and array.shape != shape:
+        raise InputError(name, f"shape {array.shape}", str(shape))
+    return array

@@ -1,0 +1,155 @@
+"""Which joints the networks of the hierarchy move: hip, body, two arms, two legs, of any humanoid (Fredriksson §7.3).
+
+He has 25 joints: the hips, ten of the body (spine, thorax, neck, head, both scapulae), three of each arm and four of
+each leg. Here a body chain is whatever lies between the hips, the head and both upper arms, an arm runs from the
+upper arm to the hand and a leg from the upper leg to the toe, joints between them included. All other joints
+(fingers, twist bones, props, joints between the hips and an upper leg) ride along with the local rotation that they
+have.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+
+from ...base.errors import InputError
+from ...motion.retargeting import structure
+from ...motion.humanoid import Limb, identify
+from ...motion.skeleton import Skeleton
+
+HIERARCHY = ("hip", "body", "left_arm", "right_arm", "left_leg", "right_leg")
+"""The networks in the order in which they speak: each knows what those before it said."""
+EFFECTORS = ("left_hand", "right_hand", "left_foot", "right_foot")
+LIMB_OF = ("left_arm", "right_arm", "left_leg", "right_leg")
+"""The chain of each effector."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chains:
+    """Joint indices of a skeleton by chain.
+
+    above: the joints over the hips, held still. members: chain name -> its joints, parents first; arms end with the
+    hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all
+    joints whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the
+    first joints of both arms and legs, middles: elbows and knees, ankles: feet. chest, neck, head: the next below where
+    there is none.
+    """
+
+    skeleton: Skeleton
+    hips: int
+    above: tuple[int, ...]
+    members: dict[str, tuple[int, ...]]
+    references: dict[str, int]
+    known: dict[str, tuple[int, ...]]
+    effectors: tuple[int, int, int, int]
+    sockets: tuple[int, int, int, int]
+    middles: tuple[int, int, int, int]
+    ankles: tuple[int, int]
+    chest: int
+    neck: int
+    head: int
+
+    @cached_property
+    def joints(self) -> tuple[int, ...]:
+        """All joints that networks move, in the order of the chains."""
+        return tuple(joint for name in HIERARCHY for joint in self.members[name])
+
+    @cached_property
+    def hip_sees(self) -> tuple[int, ...]:
+        """The 14 joints whose state the hip network sees: hips, chest, and of each limb upper, middle and end."""
+        ends = (*self.effectors[:2], *self.ankles)
+        return (self.hips, self.chest, *self.sockets, *self.middles, *ends)
+
+    @cached_property
+    def body_sees(self) -> tuple[int, ...]:
+        """The 8 joints outside the body that its network sees: elbows, knees, wrists, ankles."""
+        return (*self.middles, *self.effectors[:2], *self.ankles)
+
+    @cached_property
+    def trunk(self) -> tuple[int, ...]:
+        """Hips and body."""
+        return (self.hips, *self.members["body"])
+
+    @cached_property
+    def arm_sees(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The (7) joints of the trunk whose places the left and right arm network sees: all but its own reference."""
+        left, right = (tuple(j for j in self.trunk if j != self.references[arm]) for arm in LIMB_OF[:2])
+        return left, right
+
+    @cached_property
+    def leg_sees(self) -> tuple[int, ...]:
+        """The (6) joints of the body whose turns the leg networks see."""
+        carriers = (self.references[arm] for arm in LIMB_OF[:2])
+        return tuple(dict.fromkeys((self.members["body"][0], self.chest, *carriers, self.neck, self.head)))
+
+
+def chains_of(skeleton: Skeleton) -> Chains:
+    """The chains of a humanoid skeleton. InputError where it lacks hands, legs or a trunk between hips and arms."""
+    body = identify(skeleton)
+    _check(body.left, body.right)
+    parents = skeleton.parents
+    arms = [_between(skeleton, limb.upper_arm, limb.hand) for limb in (body.left, body.right)]
+    legs = [_between(skeleton, limb.upper_leg, limb.toe_or_foot) for limb in (body.left, body.right)]
+    sockets = (body.left.upper_arm, body.right.upper_arm, body.left.upper_leg, body.right.upper_leg)
+    top = body.neck if body.head is None else body.head
+    trunk: set[int] = set()
+    for joint in (*(parents[arm] for arm in sockets[:2]), *([] if top is None else [top])):
+        trunk |= set(_between(skeleton, body.hips, joint)) - {body.hips}
+    if not trunk:
+        raise InputError("skeleton", "no joint between the hips and the arms", "a spine")
+    members = dict(zip(HIERARCHY, [(body.hips,), tuple(sorted(trunk)), *arms, *legs]))
+    references = dict(zip(HIERARCHY, [-1, body.hips, *(parents[joint] for joint in sockets)]))
+    chest = structure.common_ancestor(parents, [parents[arm] for arm in sockets[:2]])
+    head = chest if top is None else top
+    return Chains(
+        skeleton=skeleton,
+        hips=body.hips,
+        above=tuple(j for j in _between(skeleton, 0, body.hips) if j != body.hips),
+        members=members,
+        references=references,
+        known=_known(skeleton, members),
+        effectors=(body.left.hand, body.right.hand, body.left.toe_or_foot, body.right.toe_or_foot),
+        sockets=sockets,
+        middles=(body.left.lower_arm, body.right.lower_arm, body.left.lower_leg, body.right.lower_leg),
+        ankles=(body.left.foot, body.right.foot),
+        chest=chest,
+        neck=head if body.neck is None else body.neck,
+        head=head,
+    )
+
+
+def _check(left: Limb, right: Limb) -> None:
+    wanted = ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
+    missing = [
+        f"{side} {part.replace('_', ' ')}"
+        for side, limb in (("left", left), ("right", right))
+        for part in wanted
+        if getattr(limb, part) is None
+    ]
+    if missing:
+        found = f"no {', no '.join(missing)}"
+        raise InputError("skeleton", found, "a body with arms, hands and feet", "take another rig")
+
+
+def _between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
+    """Joints from `high` down to `low`, both included; InputError where `low` does not hang below."""
+    way = sorted(structure.path(skeleton.parents, low))
+    if high not in way:
+        found = f"{skeleton.names[low]} does not hang below {skeleton.names[high]}"
+        raise InputError("skeleton", found, "limbs whose joints follow each other")
+    return tuple(way[way.index(high) :])
+
+
+def _known(skeleton: Skeleton, members: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
+    """Every joint with the chain of the nearest chain joint at or above it, the joints over the hips with the hip; and
+    the first joint of a limb also with the chain that it hangs on, which tells its place."""
+    owner = {joint: name for name, joints in members.items() for joint in joints}
+    found: dict[str, list[int]] = {name: [] for name in HIERARCHY}
+    of: list[str] = []
+    for joint, parent in enumerate(skeleton.parents):
+        of.append(owner.get(joint, of[parent] if parent >= 0 else "hip"))
+        found[of[-1]].append(joint)
+        if parent >= 0 and of[parent] != of[-1]:
+            found[of[parent]].append(joint)
+    return {name: tuple(joints) for name, joints in found.items()}

@@ -1,0 +1,209 @@
+"""How far joints turn: the range that the training data show, and hinges that do not bend backwards.
+
+A joint's range is kept about the mean of its rotations in the training data: the offset from that mean is a rotation
+vector, and each of its three components stays between the lowest and highest that was seen, widened by a margin. About
+the mean the vectors are short, also where a rig's rest pose lies far from how the joint is used, so the box has no
+seam. A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular
+velocities"); `within` brings it back.
+
+As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest and highest offset (rad) of each joint.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.vectors import unit_vector
+from ...base.errors import InputError
+from ...motion import quaternion
+from ...base.arctangent import arctan2
+from ...motion.humanoid import identify
+from ...motion.skeleton import Skeleton, frozen_array
+
+FREE = 4.0
+"""Radians: offsets never get so long, so a joint with this range is free."""
+_MARGIN = np.radians(10.0)  # beyond what the data show, on either side
+_SHARE = 0.08  # of the range, on either side
+_ROUNDS = 8  # steps to a mean rotation and to the middle of a range
+_CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
+_BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
+_OFF = 1e-9  # radians
+_TURNS = 6  # of box and hinges, until both are kept
+_LONG = 2.0  # radians: longer offsets may as well be meant the other way round
+_TINY = 1e-12  # metres: what is shorter has no direction
+_ONES = np.ones(3)
+_PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
+_PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
+
+
+def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
+    """Limits (J, 3, 3) of the joints whose local rotations (N, J, 4) are given; joints in `free` get none.
+
+    The ends are what the data show, widened by 10 degrees and 8 % of the range: a few people do not show all that a
+    joint can do."""
+    q = np.asarray(rotations, dtype=float)
+    middle = _mean(q)
+    for _ in range(_ROUNDS):
+        offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
+        low, high = offsets.min(axis=0), offsets.max(axis=0)
+        # from the middle of the range vectors stay far from half a turn, where they jump
+        middle = quaternion.multiply(middle, quaternion.from_rotation_vector(0.5 * (low + high)))
+    offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
+    low, high = offsets.min(axis=0), offsets.max(axis=0)
+    margin = _MARGIN + _SHARE * (high - low)
+    out = np.stack([quaternion.to_rotation_vector(middle), low - margin, high + margin], axis=1)
+    out[list(free), 1:] = np.array([[-FREE], [FREE]])
+    return out
+
+
+def _mean(q: np.ndarray) -> np.ndarray:
+    """The mean rotation (J, 4) of unit quaternions (N, J, 4), by steps along the mean offset (the Karcher mean)."""
+    middle = quaternion.normalized(np.sum(np.where(np.sum(q * q[:1], axis=-1, keepdims=True) < 0, -q, q), axis=0))
+    for _ in range(_ROUNDS):
+        offset = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q)).mean(axis=0)
+        middle = quaternion.multiply(middle, quaternion.from_rotation_vector(offset))
+    return quaternion.normalized(middle)
+
+
+@dataclass(frozen=True, eq=False)
+class Hinge:
+    """Which way an elbow or knee bends. joint, end: the lower bone's joint and the one that ends it. across (3,): unit,
+    in the axes of the joint's parent, about which it bends; along (3,): the lower bone's direction there when straight;
+    bone (3,): the lower bone in the joint's own axes, metres."""
+
+    joint: int
+    end: int
+    across: np.ndarray
+    along: np.ndarray
+    bone: np.ndarray
+
+
+class JointLimits:
+    """Limits ready for use. limits: (J, 3, 3) as of `learn`. InputError for another shape, or no numbers."""
+
+    def __init__(self, skeleton: Skeleton, limits: np.ndarray):
+        limits = frozen_array(limits)
+        if limits.shape != (len(skeleton), 3, 3) or not np.isfinite(limits).all():
+            raise InputError("joint limits", f"an array {limits.shape}", f"finite numbers ({len(skeleton)}, 3, 3)")
+        if np.any(limits[:, 1] > limits[:, 2]):
+            raise InputError("joint limits", "a lowest angle above the highest", "lowest, then highest")
+        self.skeleton = skeleton
+        self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
+        self._back = np.ascontiguousarray(self.middle.swapaxes(-1, -2))
+        self.low, self.high = limits[:, 1], limits[:, 2]
+        self._hold(_hinges(skeleton, self.middle))
+
+    def _hold(self, hinges: tuple[Hinge, ...]) -> None:
+        self.hinges = hinges
+        self._joints = np.array([hinge.joint for hinge in self.hinges], dtype=int)
+        self._bones = np.array([hinge.bone for hinge in self.hinges]).reshape(-1, 3, 1)
+        axes = [(np.cross(hinge.across, hinge.along), hinge.along) for hinge in self.hinges]
+        self._axes = np.array(axes).reshape(-1, 2, 3)
+
+    def of_joints(self, joints: Sequence[int]) -> JointLimits:
+        """The limits of these joints alone, which are the only ones in what it is then asked of, in this order."""
+        joints, part = list(joints), copy(self)
+        part.middle, part._back, part.low, part.high = (
+            values[joints] for values in (self.middle, self._back, self.low, self.high)
+        )
+        part._hold(tuple(replace(one, joint=joints.index(one.joint)) for one in self.hinges if one.joint in joints))
+        return part
+
+    def offsets(self, local: np.ndarray) -> np.ndarray:
+        """Rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
+        m = self._back @ local
+        parts = m.reshape(*m.shape[:-2], 9) @ _PARTS  # twice the sine times the axis, and the trace
+        sine = 0.5 * parts[..., :3]
+        length = np.sqrt((sine * sine) @ _ONES)
+        angle = arctan2(length, 0.5 * (parts[..., 3] - 1.0))
+        scale = np.where(length > 1e-7, angle / np.maximum(length, 1e-7), 1.0)
+        offsets = scale[..., None] * sine
+        return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
+
+    def _other_way_round(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
+        """The offsets (..., J, 3), long ones by the long way round where that is nearer to the range: over half a turn
+        the short way jumps to the other side."""
+        long = offsets * (1.0 - 2.0 * np.pi / np.maximum(angle, _LONG))[..., None]
+        over = [np.abs(way - np.clip(way, self.low, self.high)).max(-1) for way in (offsets, long)]
+        return np.where(((angle > _LONG) & (over[1] < over[0]))[..., None], long, offsets)
+
+    def beyond(self, local: np.ndarray) -> np.ndarray:
+        """How far local rotations (..., J, 3, 3) lie outside, (..., J) rad: out of the box, or bent backwards."""
+        offsets = self.offsets(local)
+        out = np.linalg.norm(offsets - np.clip(offsets, self.low, self.high), axis=-1)
+        joints = [hinge.joint for hinge in self.hinges]
+        out[..., joints] = np.maximum(out[..., joints], self._backwards(local))
+        return out
+
+    def within(self, local: np.ndarray, given: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad. given (..., J, 3,
+        3): rotations that are allowed, even where they lie outside."""
+        low, high, most = self.low, self.high, _BACK
+        if given is not None:
+            allowed = self.offsets(given)
+            low, high = np.minimum(low, allowed), np.maximum(high, allowed)
+            most = np.maximum(most, -self.bends(given))
+        over = 0.0
+        for _ in range(_TURNS):  # a hinge that comes forward may leave the box, and the other way round
+            local, out = self._in_box(local, low, high)
+            over, back = np.maximum(over, out), self._backwards(local, most)
+            if not (back > _OFF).any():
+                break
+            local, over = self._forward(local, over, back)
+        return local, over
+
+    def _in_box(self, local, low, high) -> tuple[np.ndarray, np.ndarray]:
+        offsets = self.offsets(local)
+        kept = np.minimum(np.maximum(offsets, low), high)
+        over = np.abs(offsets - kept).max(-1)
+        outside = over > _OFF
+        if outside.any():
+            local, joints = local.copy(), np.nonzero(outside)
+            turns = quaternion.to_matrix(quaternion.from_rotation_vector(kept[joints]))
+            local[joints] = self.middle[joints[-1]] @ turns
+        return local, over
+
+    def _forward(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
+        local, over = local.copy(), over.copy()
+        for number, hinge in enumerate(self.hinges):
+            turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
+            local[..., hinge.joint, :, :] = quaternion.to_matrix(turn) @ local[..., hinge.joint, :, :]
+            over[..., hinge.joint] = np.maximum(over[..., hinge.joint], back[..., number])
+        return local, over
+
+    def bends(self, local: np.ndarray) -> np.ndarray:
+        """Bends (..., H) rad of `hinges` in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
+        bones = local[..., self._joints, :, :] @ self._bones
+        shares = self._axes @ bones
+        return arctan2(shares[..., 0, 0], shares[..., 1, 0])
+
+    def _backwards(self, local: np.ndarray, most: float | np.ndarray = _BACK) -> np.ndarray:
+        """Radians (..., H) by which hinges bend further back than `most`."""
+        return np.maximum(-most - self.bends(local), 0.0)
+
+
+def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
+    """Elbows and knees whose mean pose shows which way they bend. middle: (J, 3, 3) mean local rotations."""
+    body = identify(skeleton)
+    found = []
+    for limb in (body.left, body.right):
+        for upper, lower, end in ((limb.upper_arm, limb.lower_arm, limb.hand),
+                                  (limb.upper_leg, limb.lower_leg, limb.foot)):
+            if None not in (upper, lower, end):
+                found.append(_hinge(skeleton, middle, lower, end))
+    return tuple(hinge for hinge in found if hinge is not None)
+
+
+def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hinge | None:
+    """None where other joints stand between the two bones or where the mean pose is straight."""
+    if skeleton.parents[end] != lower:
+        return None
+    along = unit_vector(skeleton.offsets[lower], least=_TINY)
+    across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], least=_TINY))
+    if np.linalg.norm(across) < np.sin(_CLEAR):
+        return None
+    return Hinge(lower, end, unit_vector(across, least=_TINY), along, skeleton.offsets[end])

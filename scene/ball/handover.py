@@ -1,0 +1,234 @@
+"""Blender's rigid bodies take an animated ball over on a frame, as fast and with the spin that it has there, and give
+it back.
+
+Blender takes a body's first velocity from its last keyed step, which is its mean over that frame: while the ball flies,
+half a frame of gravity too little. So the key before the handover is moved by that much (some millimetres), and put
+back afterwards.
+"""
+
+from __future__ import annotations
+
+import json
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ..core import channels, linked
+from ..core.measure import frames_per_second, units_per_metre
+
+GROUND = "Ball Ground"
+SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
+OURS = "beyond_mocap_physics"
+"""Custom property of what a handover has made."""
+ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
+CHOSEN = ("selected_objects", "selected_editable_objects")
+WORLD = ("substeps_per_frame", "solver_iterations")
+SPAN = ("frame_start", "frame_end")
+STRONGEST = 200.0  # of gravity's weight; Blender takes its number for units a second squared, whatever a unit is
+FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
+
+
+def hand_over(
+    scene: bpy.types.Scene, ball: bpy.types.Object, frame: int, kind: str, solid: list[bpy.types.Object]
+) -> None:
+    """From `frame` on Blender's rigid bodies move the ball, over a slab that ends at the ground; `solid` objects are in
+    its way too. kind: of `physics.BALLS`. InputError, and nothing changed, where that cannot be."""
+    from ...beyond_mocap.ball.physics import BALLS
+
+    _check(ball, frame)
+    curves = channels.curves(*channels.playing(ball))
+    fps = frames_per_second(scene)
+    velocity = _velocity(curves, frame, fps)
+    shifted = _shift(curves, frame, velocity, fps)
+    others = any(thing.beyond_mocap_aim.handed for thing in scene.objects)
+    kept = {"world": scene.rigidbody_world is not None, "others": others, "solid": [], "keys": shifted}
+    _world(scene, frame, kept)
+    _solids(scene, solid, kept)
+    _ball(scene, ball, frame, BALLS[kind], np.linalg.norm(velocity) / units_per_metre(scene))
+    aim = ball.beyond_mocap_aim
+    aim.handed, aim.handover, aim.handed_before = True, frame, json.dumps(kept)
+
+
+def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
+    """The ball goes its keyed way again; what the handover made goes, unless another ball lies on it."""
+    linked.refuse(ball)
+    _refuse_hidden(ball)
+    aim = ball.beyond_mocap_aim
+    kept = json.loads(aim.handed_before or "{}")
+    if ball.rigid_body is not None:
+        _remove(ball)
+    action, slot = channels.playing(ball)
+    if action is not None:
+        curves = channels.curves(action, slot)
+        for path, index, at, value in kept.get("keys", ()):
+            _move(curves.get((path, index)), at, value)
+        kinematic = curves.get(("rigid_body.kinematic", 0))
+        if kinematic is not None:
+            channels.remove_curve(action, slot, kinematic)
+    for name in ("handed", "handed_before"):
+        aim.property_unset(name)
+    heir = next((thing for thing in scene.objects if thing.beyond_mocap_aim.handed), None)
+    if heir is not None:  # what came before the first handover is brought back after the last
+        theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
+        if not kept.get("others"):
+            theirs.update(
+                {name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False
+            )
+        theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
+        heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
+        return
+    for name in kept.get("solid", ()):
+        thing = scene.objects.get(name)
+        if thing is not None and thing.rigid_body is not None and thing.visible_get():
+            _remove(thing)
+    slab = scene.objects.get(GROUND)
+    if slab is not None and slab.get(OURS):
+        mesh = slab.data
+        bpy.data.objects.remove(slab)
+        bpy.data.meshes.remove(mesh)
+    world = scene.rigidbody_world
+    if world is not None and not kept.get("world", True):
+        with bpy.context.temp_override(scene=scene):
+            bpy.ops.rigidbody.world_remove()
+    elif world is not None:
+        for name in WORLD:
+            setattr(world, name, kept.get(name, getattr(world, name)))
+        world.effector_weights.gravity = kept.get("gravity", world.effector_weights.gravity)
+        for name in SPAN if not world.point_cache.is_baked else ():
+            setattr(world.point_cache, name, kept.get(name, getattr(world.point_cache, name)))
+
+
+def _check(ball: bpy.types.Object, frame: int) -> None:
+    linked.refuse(ball)
+    channels.check_free(ball)
+    if ball.type != "MESH":
+        raise InputError(f"object {ball.name}", f"of type {ball.type.lower()}", "a mesh", "select the ball")
+    _refuse_hidden(ball)
+    if ball.beyond_mocap_aim.handed or ball.rigid_body is not None:
+        step = "press Take Ball Back first"
+        raise InputError(f"ball {ball.name}", "a rigid body already", "a ball that is keyed", step)
+    if ball.parent is not None or any(constraint.influence for constraint in ball.constraints):
+        found = "it has a parent or a constraint"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own keys", "free the ball first")
+    action, slot = channels.playing(ball)
+    ends = channels.keyed_range(channels.curves(action, slot)) if action is not None else None
+    if ends is None or not ends[0] + 2 <= frame <= ends[1]:
+        found = "no keys" if ends is None else f"keys on frames {ends[0]} to {ends[1]}"
+        expected = f"keys from two frames before the handover on frame {frame} up to it"
+        raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
+    if any(("location", axis) not in channels.curves(action, slot) for axis in range(3)):
+        raise InputError(f"ball {ball.name}", "no keys of all three of its coordinates", "them", "key its location")
+    linked.refuse(action)
+
+
+def _refuse_hidden(ball: bpy.types.Object) -> None:
+    """InputError for a ball that is hidden: Blender changes no rigid body then."""
+    if not ball.visible_get():
+        step = "show it with Alt-H, or its collection"
+        raise InputError(f"ball {ball.name}", "it is hidden", "a ball that is shown", step)
+
+
+def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
+    """(3,) units a second of the ball on a frame, by its keys on either side; by those before it where they end there,
+    or where it bounces behind it."""
+    at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
+    places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
+    before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
+    ahead = places[3] - places[2]
+    smooth = np.linalg.norm(ahead - before) < 0.2 * np.linalg.norm(before) + 1e-6
+    return (0.5 * (ahead + before) if smooth else last) * fps
+
+
+def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
+    """Move the key before the handover so that its step there is the ball's velocity; (path, index, frame, old value)
+    each."""
+    kept = []
+    for axis in range(3):
+        curve = curves["location", axis]
+        now, old = (float(value) for value in channels.sample(curve, np.array([frame, frame - 1.0])))
+        if _move(curve, frame - 1.0, now - float(velocity[axis]) / fps):
+            kept.append(("location", axis, frame - 1.0, old))
+    return kept
+
+
+def _move(curve, frame: float, value: float) -> bool:
+    """Give a curve's key on a frame another value; whether there is one."""
+    for key in curve.keyframe_points if curve is not None else ():
+        if abs(key.co.x - frame) < 0.005:
+            key.co.y = value
+            curve.update()
+            return True
+    return False
+
+
+def _world(scene, frame: int, kept: dict) -> None:
+    if scene.rigidbody_world is None:
+        with bpy.context.temp_override(scene=scene):
+            bpy.ops.rigidbody.world_add()
+    world = scene.rigidbody_world
+    for name, value in FINE.items():
+        kept[name] = getattr(world, name)
+        setattr(world, name, max(value, getattr(world, name)))
+    kept["gravity"] = world.effector_weights.gravity
+    if not kept["others"]:
+        world.effector_weights.gravity = min(kept["gravity"] * units_per_metre(scene), STRONGEST)
+    cache = world.point_cache
+    kept.update({name: getattr(cache, name) for name in SPAN})
+    if not cache.is_baked:
+        cache.frame_start = min(cache.frame_start, frame - 2) if kept["world"] else frame - 2
+        cache.frame_end = max(cache.frame_end, scene.frame_end, frame + int(5 * frames_per_second(scene)))
+
+
+def _solids(scene, solid: list, kept: dict) -> None:
+    """The ground and whatever else the ball may hit."""
+    slab = scene.objects.get(GROUND)
+    if slab is None:
+        units = units_per_metre(scene)
+        mesh, shape = bpy.data.meshes.new(GROUND), bmesh.new()
+        bmesh.ops.create_cube(shape, size=1.0)
+        for corner in shape.verts:
+            corner.co.x, corner.co.y = corner.co.x * SIZE * units, corner.co.y * SIZE * units
+            corner.co.z = (corner.co.z - 0.5) * THICK * units
+        shape.to_mesh(mesh)
+        shape.free()
+        slab = bpy.data.objects.new(GROUND, mesh)
+        slab[OURS] = True
+        slab.hide_render = slab.hide_select = True
+        slab.display_type = "BOUNDS"
+        scene.collection.objects.link(slab)
+    for thing in (slab, *solid):
+        if thing.rigid_body is None:
+            _add(thing, "PASSIVE")
+            thing.rigid_body.collision_shape = "BOX" if thing is slab else "MESH"
+            thing.rigid_body.restitution = thing.rigid_body.friction = 1.0  # Blender multiplies both bodies' values
+            thing.rigid_body.use_margin, thing.rigid_body.collision_margin = True, 0.0
+            if thing is slab:
+                thing.hide_set(True)
+            else:
+                kept["solid"].append(thing.name)
+
+
+def _ball(scene, ball: bpy.types.Object, frame: int, kind, speed: float) -> None:
+    """The ball's own numbers, and when the rigid bodies take it."""
+    _add(ball, "ACTIVE")
+    body = ball.rigid_body
+    body.collision_shape, body.mass = "SPHERE", kind.mass
+    body.restitution, body.friction = kind.restitution, kind.friction or 0.2
+    body.linear_damping = float(-np.expm1(-(kind.linear_drag + kind.drag * speed)))
+    body.angular_damping = ROLLS_OUT
+    body.use_margin, body.collision_margin, body.use_deactivation = True, 0.0, True
+    for at, keyed in ((frame, True), (frame + 1, False)):
+        body.kinematic = keyed
+        ball.keyframe_insert("rigid_body.kinematic", frame=at)
+
+
+def _add(thing: bpy.types.Object, kind: str) -> None:
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
+        bpy.ops.rigidbody.object_add(type=kind)
+
+
+def _remove(thing: bpy.types.Object) -> None:
+    with bpy.context.temp_override(object=thing, active_object=thing, **dict.fromkeys(CHOSEN, [thing])):
+        bpy.ops.rigidbody.object_remove()

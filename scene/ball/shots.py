@@ -1,0 +1,382 @@
+"""The settings of an aimed ball as a shot of the core; the shot as keys, as a curve, and as what the overlays draw."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ..core import channels, linked
+from ..core.material import colour
+from ..core.measure import frames_per_second, units_per_metre
+from ..passes.hits_shown import motion_of
+from ..passes.settings import KEPT
+from ..core.set_aside import bring_back, put_aside
+from .settings import MARK
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.ball.flight import Flight
+    from ...beyond_mocap.ball.shot import Shot, Strikes
+
+CLOSEST = 0.02  # frames between two keys at least; Blender takes keys within 0.01 for one
+STROKES = 40  # of a candidate's way that is drawn
+CURVE_STEP = 0.04  # s between two points of the curve
+
+
+@dataclass(frozen=True, eq=False)
+class Wish:
+    """What is asked: the values of `BeyondMocapAim`, with the target (3,) and the ball's place (3,) in metres. body is
+    an object: a wish lives no longer than the event that made it."""
+
+    body: bpy.types.Object | None
+    part: str
+    side: str
+    bone: str
+    first: int
+    last: int
+    target: tuple[float, float, float]
+    place: tuple[float, float, float]
+    way: str = "AIR"
+    bounces: int = 0
+    timing: str = "FREE"
+    seconds: float = 1.0
+    arrival: int = 0
+    ball: str = "football"
+    back: float = 0.0
+    left: float = 0.0
+    human: bool = True
+    follow: float = 3.0
+
+    def key(self) -> tuple:
+        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits of a
+        number."""
+        values = (getattr(self, field.name) for field in fields(self))
+        return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
+
+
+def _rounded(value):
+    if isinstance(value, tuple):
+        return tuple(_rounded(part) for part in value)
+    return round(value, 4) if isinstance(value, float) else value
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A shot in a scene: its core values, the ball's whole way from the strike on (seconds 0), scene frame of the
+    strike, frames a second, and a digest of what it was made of; candidates (N, STROKES, 3) m, of launches that are
+    possible."""
+
+    digest: str
+    shot: "Shot"
+    strikes: "Strikes"
+    flight: "Flight"
+    strike: int
+    fps: float
+    target: tuple[float, float, float]
+    candidates: np.ndarray
+
+
+_strikes: dict[tuple, "Strikes"] = {}
+_solved: dict[int, Solved] = {}
+
+
+def solved_of(ball: bpy.types.Object) -> Solved | None:
+    """What was solved last for a ball in this session."""
+    return _solved.get(ball.session_uid)
+
+
+def anything() -> bool:
+    """Whether any ball has been aimed in this session."""
+    return bool(_solved)
+
+
+def remember(ball: bpy.types.Object, solved: Solved) -> None:
+    """What a ball's keys show already."""
+    _solved[ball.session_uid] = solved
+
+
+def unsure(body: bpy.types.Object | None = None) -> None:
+    """The motion of a body, or of any, may be another than it was."""
+    for key in [key for key in _strikes if body is None or key[0] == body.session_uid]:
+        del _strikes[key]
+
+
+def forget() -> None:
+    """Another file is open, or the extension goes."""
+    _strikes.clear()
+    _solved.clear()
+
+
+def wish_of(scene: bpy.types.Scene, ball: bpy.types.Object) -> Wish:
+    """What an aimed ball's settings ask for; InputError where something is gone."""
+    aim = ball.beyond_mocap_aim
+    if aim.target is None or aim.target.name not in scene.objects:
+        step = "pick a target, or press Leave Aim"
+        raise InputError(f"ball {ball.name}", "its target is gone", "an object to aim at", step)
+    if aim.body is not None and aim.body.name not in scene.objects:
+        found = f"{aim.body.name} is not in this scene"
+        raise InputError(f"ball {ball.name}", found, "a body of this scene", "pick another body")
+    if aim.body is None and ball.get(KEPT):
+        step = "pick a body, or press Leave Aim"  # a ball that was made for a strike has no place of its own
+        raise InputError(f"ball {ball.name}", "no body strikes it", "the body that it was made for, or another", step)
+    same = {field.name: getattr(aim, field.name) for field in fields(Wish) if field.name not in ("target", "place")}
+    return Wish(**same, target=place_of(scene, aim.target), place=tuple(aim.place))
+
+
+def place_of(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[float, float, float]:
+    """Where an object is, metres."""
+    return tuple(float(value) / units_per_metre(scene) for value in thing.matrix_world.translation)
+
+
+def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
+    """Where the part can strike; without a body, where the ball lies."""
+    from ...beyond_mocap.ball.contact import striking_surface
+    from ...beyond_mocap.ball.physics import BALLS
+    from ...beyond_mocap.ball.shot import Strikes
+
+    if wish.last < wish.first:
+        found = f"frames {wish.first} to {wish.last}"
+        raise InputError("aim", found, "a last frame not before the first", "set From and To")
+    frames = np.arange(wish.first, wish.last + 1)
+    if wish.body is None:
+        there = np.array([wish.place])
+        return Strikes(frames[:1], there, there, -BALLS[wish.ball].radius, np.zeros((1, 3)))
+    key = (wish.body.session_uid, wish.part, wish.side, wish.bone, wish.first, wish.last, frames_per_second(scene))
+    if key not in _strikes:
+        motion, first = motion_of(scene, wish.body)
+        last = first + len(motion) - 1
+        inside = frames[(frames >= first) & (frames <= last)]
+        if not len(inside):
+            found = f"frames {wish.first} to {wish.last}, but it moves on {first} to {last}"
+            raise InputError(f"armature {wish.body.name}", found, "frames on which it moves", "set From and To")
+        surface = striking_surface(motion.skeleton, wish.bone or wish.part, wish.side)
+        found = Strikes.of(motion, surface, inside - first, inside)
+        if not (np.isfinite(found.start).all() and np.isfinite(found.velocity).all()):
+            raise InputError(f"armature {wish.body.name}", "a pose that is no number", "numbers", "look at its keys")
+        _strikes[key] = found
+    return _strikes[key]
+
+
+def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
+    """Work the shot out, anew each time, so that undo finds the same one; `name` is told where that cannot be.
+    InputError as `shoot`."""
+    from ...beyond_mocap.ball.batch import courses
+    from ...beyond_mocap.ball.flight import Launch, fly
+    from ...beyond_mocap.ball.physics import BALLS, FASTEST
+    from ...beyond_mocap.ball.shot import shoot
+
+    strikes, kind, fps = strikes_of(scene, wish), BALLS[wish.ball], frames_per_second(scene)
+    made_of = digest(wish, strikes)
+    strikes, seconds = _timed(strikes, wish, fps)
+    target = np.array(wish.target)
+    target[2] = max(target[2], kind.radius)
+    fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
+    ground = wish.way == "GROUND"
+    turns = (wish.back, wish.left)
+    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, what=f"ball {name}")
+    spin = shot.aimed.spin[shot.chosen]
+    flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
+    can = np.flatnonzero(shot.aimed.possible)
+    times = np.linspace(0.0, shot.seconds, STROKES)
+    ways, _ = courses(shot.starts[can], shot.aimed.velocity[can], shot.aimed.spin[can], kind, times)
+    return Solved(made_of, shot, strikes, flight, int(strikes.frames[shot.chosen]), fps,
+                  tuple(target), ways)
+
+
+def digest(wish: Wish, strikes: "Strikes") -> str:
+    """What a shot is made of, in a few letters."""
+    made = hashlib.sha1(repr(wish.key()[1:]).encode())
+    for values in (strikes.frames, strikes.start, strikes.end, strikes.velocity):
+        made.update(np.round(np.asarray(values, float), 5).tobytes())
+    return made.hexdigest()[:16]
+
+
+def _timed(strikes: "Strikes", wish: Wish, fps: float) -> tuple["Strikes", np.ndarray | float | None]:
+    """The strikes that come in time, and the seconds from each to the target."""
+    if wish.timing != "FRAME":
+        return strikes, wish.seconds if wish.timing == "SECONDS" else None
+    seconds = (wish.arrival - strikes.frames) / fps
+    early = seconds > 0.05
+    if not early.any():
+        expected = f"a frame behind the strike ({strikes.frames[0]})"
+        raise InputError("aim", f"arrival on frame {wish.arrival}", expected, "set Frame")
+    kept = (getattr(strikes, name)[early] for name in ("frames", "start", "end"))
+    return type(strikes)(*kept, strikes.radius, strikes.velocity[early]), seconds[early]
+
+
+def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
+    """Let a ball go the way of a shot: keys on every frame, and where it bounces and arrives; before the strike it does
+    what it did before it was aimed. In place, where it has been aimed already."""
+    aim = ball.beyond_mocap_aim
+    if not aim.before.kept:
+        put_aside(aim.before, ball)
+    ball.rotation_mode = "QUATERNION"
+    frames, places, turns = keys(scene, ball, solved)
+    curves = {"location": places, "rotation_quaternion": turns}
+    now, _ = channels.playing(ball)
+    if now is not None and now.get(MARK):
+        channels.rewrite(ball, frames, curves)
+    else:
+        named = {path: ("Object Transforms", values) for path, values in curves.items()}
+        now = channels.animate(ball, f"{ball.name} aimed", frames, named)
+    now[MARK] = solved.digest
+    remember(ball, solved)
+    aim.strike, aim.arrived = solved.strike, solved.strike + solved.shot.seconds * solved.fps
+    aim.figures, aim.told = "\n".join(lines(solved)), ""
+    draw_curve(scene, ball, solved)
+
+
+def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None:
+    """Let a ball be aimed: its settings are those of a wish."""
+    aim = ball.beyond_mocap_aim
+    for field in fields(Wish):
+        if field.name != "target":
+            setattr(aim, field.name, getattr(wish, field.name))
+    aim.target, aim.on = target, True
+
+
+def check_ball(ball: bpy.types.Object | None) -> None:
+    """InputError for a ball that something else moves."""
+    if ball is None:
+        return
+    channels.check_free(ball)
+    if ball.parent is not None or len(ball.beyond_mocap_ball.holds) or any(one.influence for one in ball.constraints):
+        found = "it has a parent, a constraint or is carried"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own", "free the ball first")
+    if ball.rigid_body is not None and not ball.rigid_body.kinematic:
+        found = "Blender's rigid bodies move it"
+        raise InputError(f"ball {ball.name}", found, "a ball of its own", "take its rigid body off")
+
+
+def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
+    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest; along X where it does
+    not."""
+    from ...beyond_mocap.ball.physics import FOOTBALL
+
+    row = int(np.argmax(np.linalg.norm(strikes.velocity, axis=1)))
+    level = strikes.velocity[row, :2]
+    size = float(np.linalg.norm(level))
+    x, y = strikes.start[row, :2] + far * (level / size if size > 0.1 else np.array([1.0, 0.0]))
+    return float(x), float(y), FOOTBALL.radius
+
+
+def radius_of(wish: Wish) -> float:
+    """Metres of the ball that a wish asks for."""
+    from ...beyond_mocap.ball.physics import BALLS
+
+    return BALLS[wish.ball].radius
+
+
+def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Frames (F,), locations (F, 3) in Blender's units and rotations (F, 4) of an aimed ball."""
+    strike, fps, flight = solved.strike, solved.fps, solved.flight
+    rest = flight.rests_from if flight.rests_from is not None else flight.end
+    last = int(np.ceil(strike + max(rest, solved.shot.seconds) * fps))
+    whole = np.arange(strike, last + 1, dtype=float)
+    exact = strike + fps * np.append(flight.bounces, solved.shot.seconds)
+    exact = exact[(exact < last) & (np.abs(exact - np.round(exact)) > CLOSEST)]
+    frames = np.sort(np.append(whole, exact))
+    frames = frames[np.append(True, np.diff(frames) > CLOSEST)]
+    seconds = (frames - strike) / fps
+    places, turns = flight.at(seconds) * units_per_metre(scene), flight.rotations(seconds)
+    earlier = _earlier(ball, strike)
+    if earlier is not None:
+        frames = np.concatenate([earlier[0], frames])
+        places, turns = np.concatenate([earlier[1], places]), np.concatenate([earlier[2], turns])
+    return frames, places, turns
+
+
+def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
+    before = ball.beyond_mocap_aim.before
+    slots = before.action.slots if before.action is not None else ()
+    slot = next((slot for slot in slots if slot.identifier == before.slot), None)
+    curves = channels.curves(before.action, slot) if slot is not None else {}
+    ends = channels.keyed_range(curves)
+    if ends is None or ends[0] >= strike or ("location", 0) not in curves:
+        return None
+    frames = np.arange(ends[0], strike, dtype=float)
+
+    def values(path: str, still: tuple) -> np.ndarray:
+        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+                   for i, value in enumerate(still)]
+        return np.stack(columns, axis=1)
+
+    turns = values("rotation_quaternion", (1.0, 0.0, 0.0, 0.0))
+    return frames, values("location", (0.0, 0.0, 0.0)), quaternion.normalized(turns)
+
+
+def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
+    """The trajectory as a curve of its own, up to where the ball rests."""
+    aim = ball.beyond_mocap_aim
+    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
+
+
+def trajectory(
+    scene: bpy.types.Scene, path: bpy.types.Object | None, ball: bpy.types.Object, flight: "Flight"
+) -> bpy.types.Object:
+    """A curve along a flight, up to where the ball rests; `path`, or a new one; seen in the view, not in a picture."""
+    units = units_per_metre(scene)
+    end = flight.rests_from if flight.rests_from is not None else flight.end
+    times = np.unique(np.concatenate([np.arange(0.0, end, CURVE_STEP), flight.bounces, [end]]))
+    points = np.ones((len(times), 4), np.float32)
+    points[:, :3] = flight.at(times) * units
+    if path is None or path.name not in scene.objects or path.type != "CURVE":
+        data = bpy.data.curves.new(f"{ball.name} trajectory", "CURVE")
+        data.dimensions = "3D"
+        data.materials.append(colour("Trajectory", (0.9, 0.9, 0.9), 0.9))
+        path = bpy.data.objects.new(data.name, data)
+        path[MARK] = True
+        path.hide_select = path.hide_render = True
+        (ball.users_collection or (scene.collection,))[0].objects.link(path)
+    splines = path.data.splines
+    line = splines[0] if len(splines) == 1 and len(splines[0].points) == len(points) else None
+    if line is None:
+        splines.clear()
+        line = splines.new("POLY")
+        line.points.add(len(points) - 1)
+    line.points.foreach_set("co", points.ravel())
+    path.data.update_tag()
+    return path
+
+
+def lines(solved: Solved) -> list[str]:
+    """A shot in lines "name: value"."""
+    shot, aimed = solved.shot, solved.shot.aimed
+    speed = float(np.linalg.norm(shot.velocity))
+    up = float(np.degrees(np.arctan2(shot.velocity[2], np.linalg.norm(shot.velocity[:2]))))
+    part = float(np.linalg.norm(solved.strikes.velocity[shot.chosen]))
+    told = [f"Struck on frame: {solved.strike}", f"Leaves with: {speed:.1f} m/s, {up:.0f}\N{DEGREE SIGN} up"]
+    if part:
+        told.append(f"Part moves: {part:.1f} m/s")
+    told.append(f"Arrives on frame: {solved.strike + shot.seconds * solved.fps:.1f}")
+    told.append(f"Flight, miss: {shot.seconds:.2f} s, {1000.0 * aimed.miss[shot.chosen]:.1f} mm")
+    before = solved.flight.bounces[solved.flight.bounces < shot.seconds - 1e-3]
+    if len(before):
+        told.append("Bounces on frame: " + ", ".join(f"{solved.strike + second * solved.fps:.1f}" for second in before))
+    if len(shot.frames) > 1:
+        told.append(f"Possible frames: {int(aimed.possible.sum())} of {len(shot.frames)}")
+    return told
+
+
+def leave(ball: bpy.types.Object) -> None:
+    """The ball is not aimed any more, and plays what it did before; its curve goes, the target stays."""
+    linked.refuse(ball)
+    channels.check_free(ball)
+    aim = ball.beyond_mocap_aim
+    path = aim.curve
+    if path is not None and path.get(MARK):
+        data = path.data
+        bpy.data.objects.remove(path)
+        if not data.users:
+            bpy.data.curves.remove(data)
+    if aim.before.kept:
+        bring_back(aim.before, ball, MARK)
+    for name in ("on", "body", "target", "curve", "told", "figures", "strike", "arrived"):
+        aim.property_unset(name)
+    _solved.pop(ball.session_uid, None)

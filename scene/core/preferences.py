@@ -1,0 +1,47 @@
+"""What a user sets once for all files, in Blender's preferences under Add-ons > Beyond Mocap.
+
+Everything works without them too (an extension that is switched on by a script alone has none): then the defaults hold.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import bpy
+
+from .properties import with_settings
+
+EXTENSION = __package__.rpartition(".")[0]
+
+
+@with_settings("preferences")
+class Preferences:
+    """The properties; panels/preferences.py draws and registers them."""
+
+
+def get() -> "Preferences | None":
+    """The user's preferences; None where the extension has none."""
+    addon = bpy.context.preferences.addons.get(EXTENSION)
+    return addon.preferences if addon is not None else None
+
+
+def threads() -> int:
+    """How many threads may be used, at least one."""
+    chosen = get()
+    return (chosen.threads if chosen else 0) or os.cpu_count() or 1
+
+
+def cache_folder(library_folder: str) -> str | None:
+    """Where the library of that folder is kept; None means beside its recordings."""
+    from ...beyond_mocap.library import cache  # slow to import, and switching the extension on has to be quick
+
+    chosen = get()
+    if not chosen or not chosen.cache_folder:
+        return None
+    return str(cache.own_folder(Path(bpy.path.abspath(chosen.cache_folder)), Path(library_folder)))
+
+
+def for_build(library_folder: str) -> dict:
+    """What the preferences say to the core's `library.build`, as its arguments."""
+    return {"cache_dir": cache_folder(library_folder), "threads": threads()}

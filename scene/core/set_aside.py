@@ -1,0 +1,103 @@
+"""What an object plays, put aside and brought back exactly: action, slot, NLA, and how it stands."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+
+from . import channels
+from ..result.result import BeyondMocapBefore
+
+STANDS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
+
+
+def put_aside(before: BeyondMocapBefore, target: bpy.types.Object) -> None:
+    """Keep what `target` plays and let it play nothing: its action comes off, its NLA tracks fall silent."""
+    before.kept, before.made = True, False
+    before.stance = json.dumps(stance_of(target))
+    data = target.animation_data
+    before.animated = data is not None
+    if data is None:
+        return
+    before.action, slot = data.action, data.action_slot
+    before.slot = slot.identifier if slot is not None else ""
+    before.use_nla, before.influence = data.use_nla, data.action_influence
+    before.blend, before.extrapolation = data.action_blend_type, data.action_extrapolation
+    data.action = None
+    data.use_nla, data.action_influence, data.action_blend_type = False, 1.0, "REPLACE"
+    data.action_extrapolation = "HOLD"
+
+
+def bring_back(before: BeyondMocapBefore, target: bpy.types.Object, mark: str) -> None:
+    """Let `target` play and stand as before it was put aside; an action of ours that it plays now, told by the custom
+    property `mark`, is removed, another one stays in the file."""
+    channels.discard(target, mark)
+    now, _ = channels.playing(target)
+    if now is not None and now != before.action and now.users == 1:
+        now.use_fake_user = True
+    if not before.animated:
+        if target.animation_data is not None:
+            target.animation_data.action = None
+            target.animation_data_clear()
+    else:
+        data = target.animation_data_create()
+        data.action = before.action
+        if before.action is not None:
+            data.action_slot = next((s for s in before.action.slots if s.identifier == before.slot), None)
+        play_as_before(before, data)
+    if before.stance:
+        stand(target, json.loads(before.stance))
+    clear(before)
+
+
+def play_as_before(before: BeyondMocapBefore, data: bpy.types.AnimData) -> None:
+    """NLA, influence and blending as they were."""
+    data.use_nla, data.action_influence = before.use_nla, before.influence
+    data.action_blend_type, data.action_extrapolation = before.blend, before.extrapolation
+
+
+def clear(before: BeyondMocapBefore) -> None:
+    """Keep nothing any more."""
+    for name in ("kept", "made", "animated", "action", "slot", "use_nla", "influence", "blend", "extrapolation",
+                 "stance"):
+        before.property_unset(name)
+
+
+def drop(before: BeyondMocapBefore, mark: str) -> None:
+    """Nothing will be brought back: an action of ours that nobody else uses is removed, others stay in the file."""
+    action = before.action
+    clear(before)
+    if action is not None:
+        purge_action(action, mark)
+
+
+def purge_action(action: bpy.types.Action, mark: str) -> None:
+    """Remove an action that carries `mark` and has no user; one without the mark stays in the file."""
+    if action.users - action.use_fake_user:
+        return
+    if action.get(mark):
+        bpy.data.actions.remove(action)
+    else:
+        action.use_fake_user = True
+
+
+def stance_of(target: bpy.types.Object) -> dict:
+    """How an object and its bones stand: name ("" for the object) -> rotation mode and STANDS."""
+    bones = target.pose.bones if target.pose is not None else ()
+    return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
+
+
+def _stands(thing) -> list:
+    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
+
+
+def stand(target: bpy.types.Object, stance: dict) -> None:
+    """Let object and bones stand as `stance_of` said."""
+    for name, (mode, *values) in stance.items():
+        thing = target if not name else target.pose.bones.get(name)
+        if thing is None:
+            continue
+        thing.rotation_mode = mode
+        for place, value in zip(STANDS, values, strict=True):
+            setattr(thing, place, value)

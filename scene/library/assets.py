@@ -1,0 +1,143 @@
+"""Motions as assets: actions with a catalog, tags, a description and a picture of their key pose.
+
+Works without a window: pictures are drawn by the core. Catalogs stand in Blender's own text beside the file; each has
+an identity that follows from its name, so that the same catalog is the same everywhere.
+"""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.annotation import DISCRETE, LOCOMOTION
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.files.whole import atomic_write
+from ..core import action
+from ..rigs import armature, export
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.motion import Motion
+
+CATALOGS = "blender_assets.cats.txt"
+TOP = "Beyond Mocap"
+_HEAD = "# This is an Asset Catalog Definition file for Blender.\n\nVERSION 1\n\n"
+_SPACE = uuid.UUID("6a8b2d0e-6f0f-5f0c-9d7b-0f3f5b3d7a11")
+
+
+@dataclass(frozen=True, eq=False)
+class Draft:
+    """A motion on its way to be an asset. frame: the pose that its picture shows; action: the name of the action that
+    plays it already, "" where one is to be made."""
+
+    name: str
+    motion: "Motion"
+    words: tuple[str, ...]
+    frame: int
+    told: str
+    action: str = ""
+
+
+def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -> Draft:
+    """A draft from a motion and its rows of words: the picture shows the first key moment, else the middle of the
+    longest row."""
+    from ...beyond_mocap.library.listing import words_of
+
+    keys = [row.key for row in rows if row.key is not None]
+    longest = max(rows, key=lambda row: row.end - row.start, default=None)
+    middle = (longest.start + longest.end) // 2 if longest is not None else len(motion) // 2
+    frame = min(keys[0] if keys else middle, len(motion) - 1)
+    return Draft(name, motion, words_of(rows)[0], frame, told, action)
+
+
+def picture(one: Draft) -> np.ndarray | None:
+    """Its picture (256, 256, 4); None for a skeleton on which no body can be put."""
+    from ...beyond_mocap.appearance.picture import pose_picture
+
+    try:
+        return pose_picture(one.motion, one.frame)
+    except InputError:
+        return None
+
+
+def catalog_of(words: Iterable[str]) -> str:
+    """The catalog of a motion with these words: its action, else its gait, else "Other"."""
+    words = tuple(words)
+    known = [word for word in words if word in DISCRETE] or [word for word in words if word in LOCOMOTION]
+    return f"{TOP}/{(known or ['other'])[0].replace('_', ' ').capitalize()}"
+
+
+def catalog_id(catalog: str) -> str:
+    """A catalog's identity, the same in every file."""
+    return str(uuid.uuid5(_SPACE, catalog))
+
+
+def make(
+    context: bpy.types.Context, drafts: list[Draft], pictures: list, apart: bool = False
+) -> list[bpy.types.Action]:
+    """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are
+    left as they are, and copies of them marked."""
+    made, rigs = [], []
+    try:
+        for one, pixels in zip(drafts, pictures):
+            own = bpy.data.actions.get(one.action) if one.action else None
+            if own is not None and apart:
+                own = own.copy()
+            if own is None:
+                rig = next((rig for rig, skeleton in rigs if skeleton.same_bones(one.motion.skeleton)), None)
+                if rig is None:
+                    rig = armature.create(context, one.motion.skeleton, "Player")
+                    rigs.append((rig, one.motion.skeleton))
+                own = action.write(rig, one.motion, context.scene, name=one.name)
+            mark(own, one, pixels)
+            made.append(own)
+    finally:
+        data = [rig.data for rig, _ in rigs]
+        bpy.data.batch_remove([rig for rig, _ in rigs])
+        bpy.data.batch_remove(data)
+    return made
+
+
+def mark(item: bpy.types.Action, one: Draft, pixels: np.ndarray | None) -> None:
+    """An action as an asset: catalog, tags, description, picture."""
+    item.asset_mark()
+    about = item.asset_data
+    about.catalog_id = catalog_id(catalog_of(one.words))
+    about.description = one.told
+    for tag in list(about.tags):
+        about.tags.remove(tag)
+    for word in one.words:
+        about.tags.new(word)
+    if pixels is not None:
+        preview = item.preview_ensure()
+        preview.image_size = pixels.shape[1], pixels.shape[0]
+        preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
+
+
+def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
+    """Add catalogs to the definitions that hold for files in `folder`: the nearest above it, else its own, written
+    beside and renamed; returns that file. InputError where it cannot be written."""
+    folder = Path(folder)
+    target = next(
+        (place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS
+    )
+    try:
+        text = target.read_text("utf-8") if target.is_file() else _HEAD
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "mend or remove the file") from None
+    new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
+    if not new:
+        return target
+    text = text.rstrip("\n") + "\n" + "".join(f"{catalog_id(name)}:{name}:{name.replace('/', '-')}\n" for name in new)
+    atomic_write(target, text)
+    return target
+
+
+def write_library(path: Path, actions: list[bpy.types.Action]) -> None:
+    """Actions as a .blend of their own, written beside and renamed; InputError where that cannot be done."""
+    export.saved(path, lambda part: bpy.data.libraries.write(part, set(actions), fake_user=True, compress=True))

@@ -1,0 +1,248 @@
+"""Motions in files that Blender's own importers read: FBX, glTF, USD.
+
+A file is imported into a scene of its own, its armature is sampled at the rate of its keys, and all that came in is
+taken away again. What comes out are joints where the bones' heads were, in metres, Z up, whatever the file's axes,
+units, rest pose and bone directions are.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.motion.skeleton import Skeleton
+from ..core import channels
+from ..core.aside import scene_aside
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.files.bvh.bvh import BvhClip
+
+LEAST, MOST = 24.0, 240.0  # frames per second at which sparse or very dense keys are sampled
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+
+
+class Take(NamedTuple):
+    """One animation of a file."""
+
+    name: str
+    motion: Motion
+
+
+def read(path: str | Path) -> list[Take]:
+    """All animations of the file's largest armature, the longest first; InputError where it has none or is broken."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(path, "no such file", "a file with an animated armature", "check the path")
+    with scene_aside("Import") as scene:
+        scene.render.fps_base = 1.0
+        scene.render.fps = 30 if path.suffix.lower() not in _USD else _usd_rate(path)
+        _bring_in(path)
+        rig = _largest_rig(path, scene)
+        takes = [_sampled(path, scene, rig, action, slot) for action, slot in _actions(path, rig)]
+    takes = [take for take in takes if len(take.motion) > 1]
+    if not takes:
+        raise InputError(path, "an armature that does not move", "an animation of at least two frames")
+    return sorted(takes, key=lambda take: -take.motion.duration)
+
+
+def as_clip(motion: Motion) -> "BvhClip":
+    """The motion as a library would read it from BVH: joints above the hips folded in, size checked and told."""
+    from ...beyond_mocap.files.bvh import bvh
+
+    with tempfile.TemporaryDirectory() as room:
+        file = Path(room, "clip.bvh")
+        bvh.write(file, motion)
+        return bvh.read(file)
+
+
+class Queue:
+    """The foreign recordings of a library that are to be converted, one at a time, so that a window stays alive.
+
+    todo: those that wait; total: how many there were; notes: what came of it, one line for each that asks for a look.
+    """
+
+    def __init__(self, folder: str | Path, cache_dir: str | None):
+        """Looks which recordings below `folder` wait; InputError where there is no folder."""
+        from ...beyond_mocap.library import cache
+        from ...beyond_mocap.library.converted import Conversions
+        from ...beyond_mocap.library.scan import own_recordings
+
+        folder = Path(folder)
+        self.conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
+        self.todo = self.conversions.waiting(own_recordings(folder))
+        self.total, self.notes = len(self.todo), []
+
+    def step(self) -> None:
+        """Convert the next one; one that cannot be converted is told and left out."""
+        from ...beyond_mocap.library.converted import stamp_of
+
+        path = self.todo.pop(0)
+        stamp = stamp_of(path)  # before it is read: what is changed meanwhile is converted again
+        try:
+            self._keep(path, read(path), stamp)
+        except InputError as error:
+            self.notes.append(f"left out: {error}")
+
+    def _keep(self, path: Path, takes: list[Take], stamp: list[int]) -> None:
+        from ...beyond_mocap.files.bvh import bvh
+
+        bvh.write(self.conversions.prepare(path), takes[0].motion)
+        self.conversions.keep(path, stamp)
+        if len(takes) > 1:
+            others = ", ".join(take.name for take in takes[1:4])
+            self.notes.append(f"{path.name}: the longest of {len(takes)} animations is its clip, left out {others}")
+
+
+def _bring_in(path: Path) -> None:
+    """Import by the first of Blender's importers for this ending that it has and that reads the file."""
+    importers = [operator for operator in _importers(path.suffix.lower()) if _exists(operator)]
+    if not importers:
+        raise InputError(path, "no importer for it in this Blender", "FBX, glTF or USD with its importer switched on",
+                         "look in the preferences under Add-ons")
+    told = "nothing came in"
+    for operator in importers:
+        try:
+            if operator(filepath=str(path)) == {"FINISHED"} and bpy.context.scene.objects:
+                return
+        except Exception as error:  # an importer may fail in any way on a broken file
+            told = (str(error).strip().splitlines() or [type(error).__name__])[-1]
+    raise InputError(path, f"cannot be read ({told})", "an intact file", "export it anew")
+
+
+def _importers(ending: str) -> list:
+    if ending == ".fbx":
+        newer, older = bpy.ops.wm.fbx_import, bpy.ops.import_scene.fbx
+        return [newer, older] if bpy.app.version >= (5, 0, 0) else [older, newer]
+    if ending in (".glb", ".gltf"):
+        return [bpy.ops.import_scene.gltf]
+    return [bpy.ops.wm.usd_import] if ending in _USD else []
+
+
+def _usd_rate(path: Path) -> int:
+    """Time codes per second of a USD file, which its importer takes as frames; 24, USD's own default, where Blender
+    brings no reader that tells."""
+    try:
+        bpy.utils.expose_bundled_modules()
+        from pxr import Usd
+
+        return max(1, round(Usd.Stage.Open(str(path)).GetTimeCodesPerSecond()))
+    except Exception:  # no such module, or a broken file, of which the importer will tell
+        return 24
+
+
+def _exists(operator) -> bool:
+    try:
+        operator.get_rna_type()
+    except (KeyError, AttributeError):
+        return False
+    return True
+
+
+def _largest_rig(path: Path, scene: bpy.types.Scene) -> bpy.types.Object:
+    """The armature with most bones; all else that does not carry it is taken out, so that frames are quick."""
+    rigs = [item for item in scene.objects if item.type == "ARMATURE" and len(item.data.bones)]
+    if not rigs:
+        raise InputError(path, "no armature in it", "a body with bones", "export the skeleton along with its animation")
+    rig = max(rigs, key=lambda item: len(item.data.bones))
+    carriers, item = {rig.name}, rig
+    while item.parent is not None:
+        item = item.parent
+        carriers.add(item.name)
+    for other in [item for item in scene.objects if item.name not in carriers]:
+        bpy.data.objects.remove(other)
+    return rig
+
+
+def _actions(path: Path, rig: bpy.types.Object) -> list[tuple[bpy.types.Action, object]]:
+    """The actions that the armature plays or keeps on its NLA tracks, each once with the slot that fits."""
+    data = rig.animation_data
+    found: dict = {}
+    if data is not None:
+        if data.action is not None:
+            found[data.action.name] = (data.action, data.action_slot)
+        for track in data.nla_tracks:
+            for strip in track.strips:
+                if strip.action is not None:
+                    found.setdefault(strip.action.name, (strip.action, strip.action_slot))
+            track.mute = True
+    if not found:
+        raise InputError(path, f"armature {rig.name} is not animated", "an animation", "export it with its animation")
+    return list(found.values())
+
+
+def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, slot) -> Take:
+    """One action, frame by frame."""
+    channels.assign(rig, action, slot)
+    fps, times = _times(action, rig.animation_data.action_slot, scene.render.fps / scene.render.fps_base)
+    bones = _tree(rig)
+    order = [rig.pose.bones.find(bone.name) for bone in bones]
+    posed = np.empty((len(times), len(rig.pose.bones), 4, 4), np.float32)
+    world = np.empty((len(times), 4, 4))
+    for number, time in enumerate(times):
+        scene.frame_set(int(np.floor(time)), subframe=float(time - np.floor(time)))
+        rig.pose.bones.foreach_get("matrix", posed[number].reshape(-1))
+        world[number] = np.array(rig.matrix_world)
+    matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender gives columns first
+    if not np.all(np.isfinite(matrices)):
+        raise InputError(path, f"action {action.name} with numbers that are none", "an intact file", "export it anew")
+    return Take(action.name, _motion(path, rig, bones, matrices, world[0], fps))
+
+
+def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:
+    """Frames per second of the keys, within LEAST and MOST, and the scene frames (T,) to look at."""
+    keys = set()
+    for (path, _), curve in channels.curves(action, slot).items():
+        if path.startswith("pose.bones"):
+            points = np.empty(2 * len(curve.keyframe_points), np.float32)
+            curve.keyframe_points.foreach_get("co", points)
+            keys.update(np.round(points[::2].astype(float), 3).tolist())
+    if not keys:
+        return rate, np.array([0.0])
+    keys = np.array(sorted(keys))
+    step = float(np.median(np.diff(keys))) if len(keys) > 1 else 1.0
+    fps = rate / step
+    fps = float(np.clip(round(fps, 2) if abs(fps - round(fps)) > 0.02 else round(fps), LEAST, MOST))
+    count = int(np.floor((keys[-1] - keys[0]) / rate * fps + 1e-2)) + 1
+    return fps, keys[0] + np.arange(count) * (rate / fps)
+
+
+def _tree(rig: bpy.types.Object) -> list[bpy.types.Bone]:
+    """The bones of the largest tree, parents first."""
+    roots = [bone for bone in rig.data.bones if bone.parent is None]
+    bones = [max(roots, key=lambda bone: len(bone.children_recursive))]
+    for bone in bones:  # grows while it is walked
+        bones.extend(bone.children)
+    return bones
+
+
+def _motion(path: Path, rig, bones, matrices: np.ndarray, world: np.ndarray, fps: float) -> Motion:
+    """Joints from bones. matrices (T, B, 4, 4): the bones in the world, metres; world (4, 4): the armature there."""
+    names = [bone.name for bone in bones]
+    parents = [-1] + [names.index(bone.parent.name) for bone in bones[1:]]
+    scales = np.linalg.norm(matrices[..., :3, :3], axis=-2)
+    if scales.min() < 1e-6:
+        raise InputError(path, "a bone of no size", "bones with a size", "apply the scale before exporting")
+    turns = quaternion.from_matrix(matrices[..., :3, :3] / scales[..., None, :])
+    rest = np.array([world @ np.array(bone.matrix_local) for bone in bones])
+    rest = quaternion.from_matrix(rest[:, :3, :3] / np.linalg.norm(rest[:, :3, :3], axis=-2)[:, None, :])
+    turns = quaternion.normalized(quaternion.multiply(turns, quaternion.inverse(rest)))
+    places = matrices[..., :3, 3]
+    local, offsets = turns.copy(), np.zeros((len(names), 3))
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            back = quaternion.inverse(turns[:, parent])
+            local[:, joint] = quaternion.multiply(back, turns[:, joint])
+            offsets[joint] = np.median(quaternion.rotate(back, places[:, joint] - places[:, parent]), axis=0)
+    tips = [number for number, bone in enumerate(bones) if not bone.children]
+    size = float(np.cbrt(abs(np.linalg.det(world[:3, :3]))))
+    ends = [quaternion.rotate(rest[number], [0.0, bones[number].length * size, 0.0]) for number in tips]
+    plain = tuple("_".join(name.split()) for name in names)
+    skeleton = Skeleton(plain, tuple(parents), offsets, tuple(tips), np.array(ends))
+    return Motion(skeleton, places[:, 0], quaternion.continuous(local), fps)

@@ -1,0 +1,304 @@
+"""The new path as an ordinary curve object: read as it lies in the world, also while it is being edited; and made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...beyond_mocap.base.digest import byte_digest
+from ...beyond_mocap.base.vectors import unit_vectors
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion.path.path import Path
+from ..player.drawn_track import points_of
+from ..core.measure import units_per_metre
+
+KINDS = (
+    ("BEZIER", "Bezier", "Points on the path, with handles"),
+    ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"),
+)
+SHAPES = (
+    ("FITTED", "Original", "Along the original path"),
+    ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
+    ("PRESENT", "As It Is", "Along the new path as it is, with other points"),
+)
+MARK = "beyond_mocap_path"  # on curve objects that were made here
+_STEP, _PIECES = 0.04, (8, 600)  # metres between places on a Bezier segment; how many there are of them
+_NURBS_PIECES = 48
+_COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
+_CLOSE = 0.03  # metres from the path that a fitted curve may be
+_APART = 5.0  # metres that points are apart at most, so that there is always one to pull
+_NEAREST, _MOST = 0.08, 240  # metres that Bezier points are apart at least, and how many there are at most
+_SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
+
+
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """A curve object as it is now. points: (P, 9) m of Bezier points and their left and right handles, or (P, 4) of
+    other control points and their weights, in the world; still: bytes that are others only where it is edited, not
+    where it is animated; notes: lines for the user."""
+
+    name: str
+    kind: str
+    points: np.ndarray
+    order: int
+    clamped: bool
+    closed: bool
+    still: bytes
+    notes: tuple[str, ...]
+
+    @property
+    def digest(self) -> bytes:
+        """Another where the path is another."""
+        return byte_digest(f"{self.kind} {self.order} {self.clamped} {self.closed}", self.still)
+
+    def line(self) -> np.ndarray:
+        """Places (N, 3) m along it, close together where it bends."""
+        from ...beyond_mocap.motion.track.drawn import nurbs_line
+
+        points = self.points
+        if self.kind == "BEZIER":
+            return _bezier(np.concatenate([points, points[:1]]) if self.closed else points)
+        if self.kind == "POLY":
+            return points[:, :3]
+        degree = min(self.order, len(points)) - 1
+        if self.closed:  # the first points once more, so that it goes round evenly
+            points = np.concatenate([points, points[:degree]])
+        weights = np.maximum(points[:, 3], 1e-6)
+        return nurbs_line(points[:, :3], weights, degree + 1, self.clamped and not self.closed, _NURBS_PIECES)[0]
+
+    def path(self) -> Path:
+        """As a path of the core. InputError where it leads nowhere."""
+        from ...beyond_mocap.path_editing.path_line import through
+
+        line = self.line()
+        if self.closed and len(line) and np.linalg.norm(line[-1] - line[0]) < 1e-6:
+            line = line[:-1]
+        return through(line, f"curve {self.name}", closed=self.closed)
+
+
+def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
+    """A curve object as it is drawn now. InputError where it has no line."""
+    if drawn is None or drawn.name not in scene.objects:
+        raise InputError(
+            "new path", "its curve is gone from the scene", "a curve object", "choose another, or make a New Curve"
+        )
+    if drawn.type != "CURVE":
+        raise InputError(f"object {drawn.name}", "no curve", "a curve object (Add > Curve)", "choose another")
+    lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]
+    if not lines:
+        raise InputError(f"curve {drawn.name}", "no line", "two points or more", "add points in edit mode")
+    spline, notes = lines[0], []
+    if len(lines) > 1:
+        notes.append(f"curve {drawn.name}: only the first of its {len(lines)} lines is the path")
+    if any(modifier.show_viewport for modifier in drawn.modifiers):
+        notes.append(f"curve {drawn.name}: its modifiers are not followed")
+    if drawn.data.shape_keys is not None:
+        notes.append(f"curve {drawn.name}: its shape keys are not followed")
+    if animated := is_animated(drawn):
+        notes.append(f"curve {drawn.name}: it moves; the motion rides it as it lay when it was edited last")
+    world, units = np.array(drawn.matrix_world), units_per_metre(scene)
+    points = _control_points(spline)
+    places = points[:, :9] if spline.type == "BEZIER" else points[:, :3]
+    turned = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]) / units
+    values = np.concatenate([turned.reshape(len(points), -1), points[:, places.shape[1]:]], axis=1)
+    if not np.isfinite(values).all():
+        raise InputError(f"curve {drawn.name}", "a point that is no number", "numbers", "move or delete that point")
+    kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
+    order = spline.order_u if kind == "NURBS" else 0
+    still = points.tobytes() + repr(units).encode() if animated else values.tobytes()
+    return Drawn(drawn.name, kind, values, order, spline.use_endpoint_u, spline.use_cyclic_u, still, tuple(notes))
+
+
+def create(
+    context: bpy.types.Context, name: str, path: Path, straight: bool = False, count: int = 0, kind: str = "BEZIER",
+    degree: int = 3,
+) -> bpy.types.Object:
+    """A curve object along a path, or a straight line as long, from its beginning toward its end.
+
+    count: control points; 0 takes as many as it needs to be within 3 cm. kind: BEZIER or NURBS; degree: of the NURBS.
+    InputError where there are too few points for the degree.
+    """
+    points, handles = _fitted(path, count, kind, degree, straight)
+    units = units_per_metre(context.scene)
+    origin = points[0] * units
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions, data.bevel_depth = "3D", 0.0
+    spline = data.splines.new(kind)
+    local = np.ascontiguousarray(points * units - origin, np.float32)
+    if kind == "BEZIER":
+        spline.bezier_points.add(len(points) - 1)
+        spline.bezier_points.foreach_set("co", local.ravel())
+        for point in spline.bezier_points:
+            point.handle_left_type = point.handle_right_type = "ALIGNED"
+        for side, places in zip(("handle_left", "handle_right"), handles):
+            spline.bezier_points.foreach_set(side, np.ascontiguousarray(places * units - origin, np.float32).ravel())
+        if path.closed and not straight:
+            spline.use_cyclic_u = True
+    else:
+        spline.points.add(len(points) - 1)
+        spline.points.foreach_set("co", np.column_stack([local, np.ones(len(local), np.float32)]).ravel())
+        spline.order_u, spline.use_endpoint_u = min(degree + 1, len(points)), True
+    made = bpy.data.objects.new(name, data)
+    made.location, made[MARK] = origin, True
+    room = context.scene.collection if context.layer_collection.exclude else context.collection
+    room.objects.link(made)
+    context.view_layer.update()
+    _as_long(context.scene, made, path)
+    return made
+
+
+def is_animated(drawn: bpy.types.Object) -> bool:
+    """Whether an object, a curve or the ground, goes elsewhere with the frame, by itself or with what it hangs on."""
+    known, waiting = set(), [drawn]
+    while waiting:
+        thing = waiting.pop()
+        if thing is None or thing in known:
+            continue
+        known.add(thing)
+        data = thing.animation_data
+        if data is not None and (data.action or data.nla_tracks or data.drivers):
+            return True
+        waiting += [thing.parent, *(getattr(constraint, "target", None) for constraint in thing.constraints)]
+    return False
+
+
+def _control_points(spline: bpy.types.Spline) -> np.ndarray:
+    """(P, 9) or (P, 4): see `Drawn`, in the curve's own space."""
+    points = points_of(spline)
+    names = (("co", 3), ("handle_left", 3), ("handle_right", 3)) if spline.type == "BEZIER" else (("co", 4),)
+    columns = []
+    for name, size in names:
+        values = np.empty(size * len(points), np.float32)
+        points.foreach_get(name, values)
+        columns.append(values.reshape(-1, size).astype(float))
+    return np.concatenate(columns, axis=1)
+
+
+def _bezier(points: np.ndarray) -> np.ndarray:
+    """Places (N, 3) along Bezier points (P, 9)."""
+    a, b, c, d = points[:-1, :3], points[:-1, 6:9], points[1:, 3:6], points[1:, :3]
+    length = sum(np.linalg.norm(end - start, axis=1) for start, end in ((a, b), (b, c), (c, d)))
+    pieces = np.clip(np.ceil(length / _STEP).astype(int), *_PIECES)
+    segment = np.repeat(np.arange(len(pieces)), pieces)
+    first = np.cumsum(pieces) - pieces
+    t = ((np.arange(pieces.sum()) - first[segment]) / pieces[segment])[:, None]
+    a, b, c, last = a[segment], b[segment], c[segment], d[-1:]
+    d = d[segment]
+    fine = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
+    return np.concatenate([fine, last])
+
+
+def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> tuple[np.ndarray, tuple]:
+    """Control points (P, 3) in metres, and for Bezier points their left and right handles."""
+    from ...beyond_mocap.path_editing import path_line
+
+    degree = 3 if kind == "BEZIER" else degree
+    more = 2 if kind == "BEZIER" else 0  # a cubic spline of P control points is a chain of P - 2 Bezier points
+    count = max(count, 2) if count else 0
+    if straight:
+        points = _lengthened(path_line.straight(path, count or max(4, degree + 1)), path)
+        third = (points[1] - points[0]) / 3.0
+        return points, (points - third, points + third)
+    if kind == "BEZIER" and not count:
+        return _chain(path)
+    points = path_line.control_points(path, count + more, degree) if count else _close_enough(path, degree)
+    if kind != "BEZIER":
+        return points, ()
+    spline = path_line.b_spline(points, degree)
+    knots = spline.breaks
+    places, pull = spline.at(knots), spline.at(knots, 1)
+    gaps = np.diff(knots)[:, None] / 3.0
+    before, after = np.concatenate([gaps[:1], gaps]), np.concatenate([gaps, gaps[-1:]])
+    return places, (places - pull * before, places + pull * after)
+
+
+def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
+    """Bezier points (P, 3) on the path and their left and right handles, closer together where it bends, so that they
+    are within _CLOSE of it. Corners that were cut would make the motion run ahead of itself from there on."""
+    from ...beyond_mocap.motion.path.arc_length import ArcLength
+
+    arc = ArcLength(path)
+    pieces = max(int(np.ceil(arc.length / _APART)), 3)
+    nodes = np.linspace(0.0, arc.length, pieces + 1)
+    while len(nodes) < _MOST:
+        gap = np.diff(nodes)
+        split = (_beside(path, arc, nodes) > _CLOSE) & (gap > 2.0 * _NEAREST)
+        if not split.any():
+            break
+        worst = np.flatnonzero(split)[: _MOST - len(nodes)]
+        nodes = np.sort(np.concatenate([nodes, nodes[worst] + 0.5 * gap[worst]]))
+    places, pull = _nodes(path, arc, nodes)
+    third = np.diff(nodes)[:, None] / 3.0
+    before, after = np.concatenate([third[:1], third]), np.concatenate([third, third[-1:]])
+    if path.closed:  # the first point is the last one too
+        return places[:-1], ((places - pull * np.concatenate([third[-1:], third]))[:-1], (places + pull * after)[:-1])
+    return places, (places - pull * before, places + pull * after)
+
+
+def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
+    u = arc.parameter(s)
+    pull = path.at(u, 1)
+    return path.at(u), unit_vectors(pull)
+
+
+def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
+    """(N - 1,) m that the Bezier segments between nodes (N,) m are off the path at the same lengths along it."""
+    places, pull = _nodes(path, arc, nodes)
+    gap = np.diff(nodes)[:, None, None]
+    t = np.linspace(0.0, 1.0, 9)[1:-1, None]
+    a, d = places[:-1, None], places[1:, None]
+    b, c = a + pull[:-1, None] * gap / 3.0, d - pull[1:, None] * gap / 3.0
+    drawn = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
+    s = nodes[:-1, None] + gap[..., 0] * t[:, 0]
+    return np.linalg.norm(drawn - path.at(arc.parameter(s.ravel())).reshape(drawn.shape), axis=2).max(axis=1)
+
+
+def _close_enough(path: Path, degree: int) -> np.ndarray:
+    """The fewest control points whose spline is within _CLOSE of the path."""
+    from ...beyond_mocap.motion.path.arc_length import ArcLength
+    from ...beyond_mocap.path_editing import path_line
+
+    arc = ArcLength(path)
+    share = np.linspace(0.0, 1.0, 400)
+    places = path.at(arc.parameter(share * arc.length * (1.0 - 1e-9)))
+    least = max(degree + 1, arc.length / _APART + 2.0)
+    for count in [count for count in _COUNTS if count >= least] or _COUNTS[-1:]:
+        points = path_line.control_points(path, count, degree)
+        if np.linalg.norm(path_line.b_spline(points, degree).at(share) - places, axis=1).max() <= _CLOSE:
+            break
+    return points
+
+
+def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None:
+    """Move a new curve's last point on where it is shorter than the path, so that the motion does not end early."""
+    from ...beyond_mocap.motion.path.arc_length import ArcLength
+
+    spline = made.data.splines[0]
+    if spline.use_cyclic_u:
+        return
+    units, length = units_per_metre(scene), ArcLength(path).length + _SPARE
+    for _ in range(3):
+        line = read(scene, made).line()
+        lacks = length - ArcLength(read(scene, made).path()).length
+        ahead = line[-1] - line[-2]
+        if lacks <= 0.0 or np.linalg.norm(ahead) < 1e-9:
+            return
+        by = Vector(ahead / np.linalg.norm(ahead) * lacks * units)
+        last = points_of(spline)[-1]
+        if spline.type == "BEZIER":
+            last.handle_left, last.handle_right = last.handle_left + by, last.handle_right + by
+            last.co = last.co + by
+        else:
+            last.co = last.co + Vector((*by, 0.0))
+
+
+def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
+    """Even points (P, 3) of a straight line, as long as the path."""
+    from ...beyond_mocap.motion.path.arc_length import ArcLength
+
+    whole = points[-1] - points[0]
+    return points[0] + (points - points[0]) * ((ArcLength(path).length + _SPARE) / np.linalg.norm(whole))

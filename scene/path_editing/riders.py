@@ -1,0 +1,359 @@
+"""Riders: armatures whose motion rides a curve. Begun, brought up to date, kept or ended; what the buttons do."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.digest import byte_digest
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..core import channels, linked
+from ..core.set_aside import drop, play_as_before
+from . import curve, keys, source
+from .carrier import MARK, carrier_of
+from .settings import choose, riders, wishes
+
+_SAMPLES = 400
+MOST_FRAMES = 40_000
+"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take
+minutes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What was worked out for a rider: plain numbers, in metres of the scene's world.
+
+    first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is
+    worked out; told: lines for the user.
+    """
+
+    first: int
+    fps: float
+    source: object
+    path: object
+    ridden: object
+    number: int
+    told: str = ""
+
+    @cached_property
+    def source_line(self) -> np.ndarray:
+        """The original path (N, 3)."""
+        return _along(self.source.path)
+
+    @cached_property
+    def line(self) -> np.ndarray:
+        """The new path (N, 3)."""
+        return _along(self.path)
+
+    def frames(self, frame: float) -> tuple[int, int]:
+        """Index of the ridden frame at a scene frame, and of the original's that is shown there; both within range."""
+        own = int(np.clip(round(frame - self.first), 0, len(self.ridden.motion) - 1))
+        return own, int(np.clip(round(self.ridden.frames[own]), 0, len(self.source.motion) - 1))
+
+
+_shown: dict[int, tuple[str, Shown]] = {}  # by session_uid of the armature: digest, what was worked out
+_counted = 0
+
+
+def forget() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _shown.clear()
+    source.forget()
+    keys.forget()
+
+
+def anybody_shown() -> bool:
+    """Whether anything was worked out for any rider; quick, since it is asked at every redraw."""
+    return bool(_shown)
+
+
+def shown(body: bpy.types.Object) -> Shown | None:
+    """What was worked out for a rider last; None where nothing was in this session."""
+    digest, known = _shown.get(body.session_uid, ("", None))
+    if known is None or not body.beyond_mocap_ride.on:
+        return None
+    played = channels.playing(body)[0]
+    return known if played is not None and played.get(MARK) == digest else None  # undo may have brought back another
+
+
+def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) -> bool:
+    """Bring a rider's motion up to date with curve and settings; whether anything had to be worked out.
+
+    anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it
+    was, where that makes no sense just now.
+    """
+    from ...beyond_mocap.path_editing.ride import RideSettings, ride
+
+    global _counted
+    ridden_by, carrier = body.beyond_mocap_ride, carrier_of(body)
+    carrier.check()
+    if anew:
+        bpy.context.view_layer.update()
+        source.unsure()
+        keys.refresh()
+    settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
+    known = source.of(carrier, scene, settings)
+    ground = source.ground_digest(scene, ridden_by.ground)
+    digest = byte_digest(known.digest, drawn.digest, ground, repr(settings)).hex()
+    made = carrier.ours()[0]
+    up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
+    if up_to_date and remembered and not anew:
+        lines = _lines(scene, ridden_by, digest, _shown[body.session_uid][1])
+        _tell(ridden_by, lines, None)  # what was wrong meanwhile is so no more
+        return False
+    path = drawn.path()
+    _check_length(known.core, path, settings)
+    ridden = ride(known.core, path, settings, source.ground_of(scene, ridden_by.ground, ground))
+    if anew or not up_to_date:
+        carrier.write(scene, known.read, ridden, digest)
+    _counted += 1
+    first, fps = known.read.first, known.read.motion.fps
+    told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
+    now = Shown(first, fps, known.core, path, ridden, _counted, told)
+    _shown[body.session_uid] = digest, now
+    _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
+    return True
+
+
+def _lines(scene: bpy.types.Scene, ride, digest: str, now: Shown) -> str:
+    """What is told of a rider; also where, other than the original, it goes on beyond the scene's end, and where it is
+    another than when riders were asked to keep apart."""
+    lines, last = [now.told] if now.told else [], now.first + len(now.ridden.motion) - 1
+    if last > max(scene.frame_end, now.first + len(now.source.motion) - 1):
+        lines.append(f"goes on to frame {last}, the scene ends at {scene.frame_end}")
+    if ride.agreed not in ("", digest):
+        lines.append("changed since Keep Apart: press it again")
+    return "\n".join(lines)
+
+
+def _check_length(known, path, settings) -> None:
+    """InputError where a motion would have to be repeated for ever."""
+    if not settings.cycle or known.arc.length <= 0.0:
+        return
+    line = _along(path)
+    metres = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
+    motion = known.motion
+    frames = len(motion) * metres / known.arc.length / settings.speed
+    if frames > MOST_FRAMES:
+        minutes = frames / motion.fps / 60.0
+        raise InputError("cycle", f"the motion would last {minutes:.0f} minutes on a path of {metres:.0f} m",
+                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
+                         "shorten the path, or switch Cycle off")
+
+
+def begin(
+    context: bpy.types.Context, body: bpy.types.Object, drawn: bpy.types.Object | None = None, count: int = 0,
+    kind: str = "BEZIER", degree: int = 3, straight: bool = False,
+) -> bpy.types.Object:
+    """Let an armature ride `drawn`, or a new curve along its own path (see `curve.create`); its action is put aside.
+    Returns the curve. InputError, and nothing changed, where it cannot."""
+    from ...beyond_mocap.path_editing.ride import RideSettings
+
+    scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
+    if ride.on:
+        raise InputError(
+            f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave"
+        )
+    carrier.check()
+    context.view_layer.update()
+    source.unsure()
+    known = source.of(carrier, scene, RideSettings(**wishes(ride))).core
+    before = ride.curve
+    if drawn is None and not (straight or count) and before is not None and before.name in scene.objects:
+        drawn = before
+    made = None
+    if drawn is None:
+        made = drawn = curve.create(context, f"{body.name} path", *_own_path(known, straight), count, kind, degree)
+    else:
+        curve.read(scene, drawn).path()
+    carrier.begin()
+    ride.on, ride.curve = True, drawn
+    try:
+        renew(scene, body)
+    except BeyondMocapError:
+        revert(body, before, made)
+        raise
+    return drawn
+
+
+def revert(body: bpy.types.Object, before: bpy.types.Object | None, made: bpy.types.Object | None) -> None:
+    """As before `begin`: the curve that the armature had before, and the one that was made for it taken away."""
+    end(body)
+    body.beyond_mocap_ride.curve = before
+    if made is not None:
+        bpy.data.curves.remove(made.data)
+
+
+def change(scene: bpy.types.Scene, body: bpy.types.Object, drawn: bpy.types.Object) -> None:
+    """Let a rider ride another curve. InputError, and nothing changed, where it cannot."""
+    ride = body.beyond_mocap_ride
+    before, ride.curve = ride.curve, drawn
+    try:
+        renew(scene, body)
+    except BeyondMocapError:
+        ride.curve = before
+        raise
+
+
+def new_curve(
+    context: bpy.types.Context, body: bpy.types.Object, shape: str = "FITTED", count: int = 0, kind: str = "BEZIER",
+    degree: int = 3,
+) -> bpy.types.Object:
+    """Another curve for a rider; shape: one of `curve.SHAPES`. The one before is removed where it was made here and
+    nobody else rides it. Returns the new one."""
+    from ...beyond_mocap.path_editing.ride import RideSettings
+
+    scene, ride = context.scene, body.beyond_mocap_ride
+    before = ride.curve
+    if shape == "PRESENT":
+        path, straight = curve.read(scene, before).path(), False
+    else:
+        settings = RideSettings(**wishes(ride))
+        path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
+    made = curve.create(context, f"{body.name} path", path, straight, count, kind, degree)
+    try:
+        change(scene, body, made)
+    except BeyondMocapError:
+        bpy.data.curves.remove(made.data)
+        raise
+    ridden = any(rider.beyond_mocap_ride.curve == before for rider in riders(scene))
+    if before is not None and before.get(curve.MARK) and not ridden:
+        name, data = before.name, before.data
+        bpy.data.objects.remove(before)
+        if not data.users:
+            bpy.data.curves.remove(data)
+        made.name = made.data.name = name
+    return made
+
+
+def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Action, str]:
+    """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Where it cannot be
+    brought up to date, the last that could is kept. Returns the action, and why it is not up to date."""
+    ride, carrier, told = body.beyond_mocap_ride, carrier_of(body), ""
+    may_keep(body)
+    try:
+        renew(scene, body)
+    except BeyondMocapError as error:
+        told = str(error)
+    made = carrier.ours()[0]
+    original, drawn = ride.before.action, ride.curve
+    carrier.settle()
+    play_as_before(ride.before, body.animation_data)
+    drop(ride.before, MARK)
+    del made[MARK]
+    name = original.name if original is not None else body.name
+    made.name = f"{name} on {drawn.name}" if drawn is not None else f"{name} path motion"
+    _over(ride)
+    return made, told
+
+
+def may_end(body: bpy.types.Object) -> None:
+    """InputError where an armature's original motion cannot be brought back here."""
+    linked.refuse(body)
+    channels.check_free(body)
+
+
+def may_keep(body: bpy.types.Object) -> None:
+    """InputError where an armature's ridden motion cannot become its own here."""
+    may_end(body)
+    carrier_of(body).ours()
+
+
+def end(body: bpy.types.Object) -> None:
+    """The armature plays its original motion again, to the last bit."""
+    carrier_of(body).end()
+    _over(body.beyond_mocap_ride)
+
+
+def leave(*bodies: bpy.types.Object | None) -> list[str]:
+    """Riders among these play their originals again, because something else is to be done with them; a line for
+    each."""
+    riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
+    for body in riding:
+        may_end(body)
+    for body in riding:
+        end(body)
+    return [f"{body.name} left its path first: its curve stays, Edit Path takes it up again" for body in riding]
+
+
+def standing(body: bpy.types.Object | None):
+    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not
+    known."""
+    now = shown(body) if body is not None else None
+    if now is None:
+        return None
+    stands = now.ridden.standing.any(axis=2)
+
+    def at(frames: np.ndarray) -> np.ndarray:
+        rows = np.round(frames).astype(int) - now.first
+        return stands[np.clip(rows, 0, len(stands) - 1)] & ((rows >= 0) & (rows < len(stands)))[:, None]
+
+    return at
+
+
+def back_to(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:
+    """Where a curve was active that nobody rides any more, the armatures that did are chosen."""
+    active = context.view_layer.objects.active
+    if context.mode != "OBJECT" or active is None or active.type != "CURVE":
+        return
+    if any(body.beyond_mocap_ride.curve == active for body in riders(context.scene)):
+        return
+    choose(context, bodies[0])
+    for body in bodies:
+        if body.name in context.view_layer.objects:
+            body.select_set(True)
+
+
+def _own_path(known, straight: bool):
+    """The path for a new curve, and whether it is to be straight: of who stands still two metres straight ahead."""
+    from ...beyond_mocap.motion.path.path import SplinePath
+    from ...beyond_mocap.path_editing.path_line import SHORTEST
+
+    if known.arc.length >= 2.0 * SHORTEST:
+        return known.path, straight
+    start, yaw = known.moving.origin[0], known.moving.heading[0]
+    ends = np.array([start, start + 2.0 * np.array([np.cos(yaw), np.sin(yaw), 0.0])])
+    return SplinePath(np.array([0.0, 0.0, 1.0, 1.0]), ends, 1), True
+
+
+def _figures(known, ridden) -> dict:
+    """What a panel says of a result, in metres and seconds."""
+    motion = ridden.motion
+    return {
+        "seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
+        "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3), "source_metres": round(float(known.arc.length), 3),
+        "seams": len(ridden.seams), "correction": round(float(np.percentile(ridden.correction, 95)), 4),
+        "miss": round(float(ridden.miss.max(initial=0.0)), 4),
+    }
+
+
+def tell(body: bpy.types.Object, line: str) -> None:
+    """Note for the panel why a rider could not follow."""
+    _tell(body.beyond_mocap_ride, line, None)
+
+
+def _tell(ride, lines: str, figures: dict | None) -> None:
+    """Write only what is new: each write is a change of the object, which is looked at again."""
+    if ride.told != lines:
+        ride.told = lines
+    text = json.dumps(figures) if figures is not None else ride.figures
+    if ride.figures != text:
+        ride.figures = text
+
+
+def _over(ride) -> None:
+    """A rider no more; a curve or ground that was deleted is not kept in the file for its sake."""
+    ride.on = False
+    ride.told = ride.figures = ""
+    for name in ("curve", "ground"):
+        thing = getattr(ride, name)
+        if thing is not None and not thing.users_scene:
+            setattr(ride, name, None)
+
+
+def _along(path) -> np.ndarray:
+    return path.at(np.linspace(*path.domain, _SAMPLES))

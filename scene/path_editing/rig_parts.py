@@ -1,0 +1,238 @@
+"""The body that a rig shows: which bones its parts can be seen on, which controls go with which part, and its motion.
+
+What moves a part (`bone_maps`) need not be what shows it: with inverse kinematics on, Rigify's FK controls stay behind.
+A part is seen on the bone that deforms the mesh where the control rests.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.motion import Motion, pose_kinematics
+from ...beyond_mocap.motion.skeleton import Skeleton
+from ..rigs import bone_maps
+from ..rigs.driven import upright_turn
+from ..rigs.followers import list_followers
+from .rig_look import Look
+
+_SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
+_STRETCH, _OFF = 1e-3, 3e-4  # metres
+_UPRIGHT = 0.64  # cosine of the angle between a standing body's trunk and the vertical, at most
+_CARRIERS = {
+    "neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
+    "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
+    "toe": ("foot",),
+}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """What is known of a rig's body. controls: part -> the bone that moves it; shown: part -> the bone that shows it,
+    in the order of joints; follows: bones that a part follows or that go with it -> the part; trunk: likewise controls
+    that bend the spine beside its own ones (Rigify's chest), where they are animated; root: the bone that carries all,
+    "" where there is none. A rig that is no standing body has one part, "body", and no controls."""
+
+    controls: dict[str, str]
+    shown: dict[str, str]
+    follows: dict[str, str]
+    trunk: dict[str, str]
+    root: str
+    humanoid: bool
+
+
+def of_rig(rig: bpy.types.Object) -> Parts | None:
+    """The parts of a standing body; None where the armature is none."""
+    try:
+        table = bone_maps.kept(rig) or bone_maps.suggest(rig)
+        bone_maps.check(rig, table)
+    except InputError:
+        return None
+    controls = {part: bone for part, bone in table.items() if part != "root"}
+    shown = {part: _shown(rig, bone) for part, bone in controls.items()}
+    shown["hips"] = _pelvis(rig, shown) or shown["hips"]
+    if not _stands(rig, shown):
+        return None
+    spine = [part for part in shown if part.startswith("spine")]
+    trunk = {"chest": spine[-1]} if spine and {"torso", "chest"} <= set(rig.data.bones.keys()) else {}
+    follows = list_followers(rig, controls, shown, _SAME * _size(rig))
+    return Parts(controls, shown, follows, trunk, table.get("root", ""), True)
+
+
+def _shown(rig: bpy.types.Object, control: str) -> str:
+    """The bone that deforms the mesh where a control rests; the control itself where there is no other."""
+    bones = rig.data.bones
+    own = bones[control]
+    if own.use_deform and not _FK_LIKE.search(control):
+        return control
+    near = _SAME * _size(rig)
+    fits = [
+        bone
+        for bone in bones
+        if (bone.head_local - own.head_local).length < near and bone.name != control
+        and bone.vector.length and _direction(bone).dot(_direction(own)) > _ALONG
+        and (bone.use_deform or bone.name.startswith("ORG-"))
+    ]  # fmt: skip
+    fits.sort(key=lambda bone: (not bone.name.startswith("ORG-"), len(bone.parent_recursive)))
+    return fits[0].name if fits else control
+
+
+_FK_LIKE = re.compile(r"(?i)(?<![a-z])(fk|ctrl|control)(?![a-z])")
+
+
+def _direction(bone: bpy.types.Bone):
+    return (bone.tail_local - bone.head_local).normalized()
+
+
+def _size(rig: bpy.types.Object) -> float:
+    heads = np.empty(3 * len(rig.data.bones), np.float32)
+    rig.data.bones.foreach_get("head_local", heads)
+    return float(np.ptp(heads.reshape(-1, 3), axis=0).max()) or 1.0
+
+
+def _pelvis(rig: bpy.types.Object, shown: dict[str, str]) -> str | None:
+    """The bone on which both thighs hang, where it is near them; a control that turns the hips may lie above it."""
+    left, right = (rig.data.bones[shown[f"{side} upper_leg"]] for side in ("left", "right"))
+    above = [bone.name for bone in left.parent_recursive]
+    bone = next((bone for bone in right.parent_recursive if bone.name in above), None)
+    own = rig.data.bones[shown["hips"]]
+    if bone is None or bone.name == own.name or bone.name in [b.name for b in own.parent_recursive]:
+        return None
+    return bone.name
+
+
+def _stands(rig: bpy.types.Object, shown: dict[str, str]) -> bool:
+    """Whether the trunk stands over the legs at rest: a quadruped's lies before them."""
+    bones = rig.data.bones
+    top = next((part for part in ("head", "neck", *(f"spine {i}" for i in range(bone_maps.SPINES, 0, -1)))
+                if part in shown), None)
+    if top is None:
+        return True
+    hips = np.mean([bones[shown[f"{side} upper_leg"]].head_local for side in ("left", "right")], axis=0)
+    feet = np.mean([bones[shown[f"{side} foot"]].head_local for side in ("left", "right")], axis=0)
+    trunk, leg = np.array(bones[shown[top]].head_local) - hips, hips - feet
+    length = np.linalg.norm(trunk) * np.linalg.norm(leg)
+    return bool(length < 1e-9 or trunk @ leg > _UPRIGHT * length)
+
+
+def upright(rig: bpy.types.Object, shown: dict[str, str]) -> np.ndarray:
+    """The turn (4,), by quarter turns, that lets the armature's space stand along Z and face +X."""
+    return upright_turn({part: np.array(rig.data.bones[bone].head_local) for part, bone in shown.items()})
+
+
+def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps: float) -> Motion:
+    """The motion that the parts' bones show, metres, joints under the core's names. units: of the scene in a metre."""
+    places, turns = in_world(seen, [seen.number(bone) for bone in parts.shown.values()], units)
+    rest = np.array([rig.data.bones[bone].matrix_local.to_3x3() for bone in parts.shown.values()])
+    stands = upright(rig, parts.shown) if parts.humanoid else quaternion.identity()
+    rest = quaternion.multiply(stands, quaternion.from_matrix(rest))
+    world = quaternion.multiply(turns, quaternion.inverse(rest))
+    names, parents = list(parts.shown), _parents(list(parts.shown))
+    local, offsets = world.copy(), np.zeros((len(names), 3))
+    for joint, parent in enumerate(parents):
+        if parent >= 0:
+            back = quaternion.inverse(world[:, parent])
+            local[:, joint] = quaternion.multiply(back, world[:, joint])
+            offsets[joint] = _constant(quaternion.rotate(back, places[:, joint] - places[:, parent]))
+    ends, tips = _tips(rig, parts, parents, rest, seen, units) if parts.humanoid else ((), np.zeros((0, 3)))
+    joints = tuple(bone_maps.JOINTS.get(name, f"Bone {name}") for name in names)
+    skeleton, local = Skeleton(joints, tuple(parents), offsets, ends, tips), quaternion.continuous(local)
+    if parts.humanoid:
+        local = _feet_where_they_are(skeleton, names, places, local)
+    return Motion(skeleton, places[:, 0], local, fps)
+
+
+def _constant(offsets: np.ndarray) -> np.ndarray:
+    """One offset (3,) for those of all frames (F, 3): the middle one, as long as the bone gets where it stretches."""
+    length, middle = np.linalg.norm(offsets, axis=1), np.median(offsets, axis=0)
+    longest = np.percentile(length, 99.5)
+    return middle * longest / np.linalg.norm(middle) if longest - np.median(length) > _STRETCH else middle
+
+
+def _feet_where_they_are(skeleton: Skeleton, names: list[str], places: np.ndarray, local: np.ndarray) -> np.ndarray:
+    """Local rotations (F, J, 4) with which the ankles are at their places (F, J, 3) although no bone stretches; what
+    stands in the rig stands in the motion, to be held there."""
+    from ...beyond_mocap.motion.reach import two_bone  # this brings scipy, which is slow to import
+
+    shown, _ = pose_kinematics(skeleton, places[:, 0], local)
+    for side in ("left", "right"):
+        leg = tuple(names.index(f"{side} {part}") for part in ("upper_leg", "lower_leg", "foot"))
+        if np.linalg.norm(shown[:, leg[2]] - places[:, leg[2]], axis=1).max() > _OFF:
+            local = two_bone(skeleton, places[:, 0], local, leg, places[:, leg[2]], soft=1e-4).rotations
+    return local
+
+
+def in_world(seen: Look, bones: list[int], units: float) -> tuple[np.ndarray, np.ndarray]:
+    """Places (F, n, 3) metres and rotations (F, n, 4) of bones in the world."""
+    matrices = seen.lies[:, None] @ seen.poses[:, bones]
+    return matrices[..., :3, 3] / units, rotations(matrices)
+
+
+def rotations(matrices: np.ndarray) -> np.ndarray:
+    """Rotations (..., 4) of matrices (..., 4, 4), whatever their scale."""
+    turn = matrices[..., :3, :3]
+    return quaternion.from_matrix(turn / np.maximum(np.linalg.norm(turn, axis=-2, keepdims=True), 1e-12))
+
+
+def _parents(names: list[str]) -> list[int]:
+    """The joint on which each part hangs; the first is the root, and what is not known hangs on it."""
+    found = []
+    for number, name in enumerate(names):
+        side, kind = name.partition(" ")[::2] if name.startswith(("left", "right")) else ("", name.partition(" ")[0])
+        above = [other for other in names[:number] if other.partition(" ")[0] == kind] if not side else []
+        for carrier in _CARRIERS.get(kind, ()) if not above else ():
+            above = [o for o in names[:number] if o == f"{side} {carrier}" or o.partition(" ")[0] == carrier]
+            if above:
+                break
+        found.append(-1 if not number else names.index(above[-1]) if above else 0)
+    return found
+
+
+def _tips(rig, parts: Parts, parents: list[int], rest: np.ndarray, seen: Look, units: float):
+    """Joints that end a limb, and their tips in metres, as far as the bones' tails show them."""
+    names, ends, tips = list(parts.shown), [], []
+    size = float(np.cbrt(abs(np.linalg.det(seen.lies[0][:3, :3])))) / units
+    for joint, (name, bone) in enumerate(parts.shown.items()):
+        kind = name.rpartition(" ")[2]
+        if joint in parents or kind not in ("hand", "foot", "toe", "head"):
+            continue
+        tip = quaternion.rotate(rest[joint], [0.0, rig.data.bones[bone].length * size, 0.0])
+        toward = np.array([0.0, 0.0, 1.0]) if kind == "head" else np.array([1.0, 0.0, 0.0])
+        if kind == "hand":
+            heads = [np.array(rig.data.bones[parts.shown[names[i]]].head_local) for i in (joint, parents[joint])]
+            toward = quaternion.rotate(upright(rig, parts.shown), heads[0] - heads[1])
+        if tip @ toward > 0.5 * np.linalg.norm(tip) * np.linalg.norm(toward) > 0.0:
+            ends.append(joint)
+            tips.append(tip)
+    return tuple(ends), np.array(tips).reshape(-1, 3)
+
+
+def whole(rig: bpy.types.Object, seen: Look, object_keyed: bool, units: float) -> Parts:
+    """An armature that is no standing body: one part, the topmost bone that goes where most bones go."""
+    bones = [bone.name for bone in rig.data.bones if bone.use_deform] or seen.bones
+    places, _ = in_world(seen, [seen.number(name) for name in bones], units)
+    middle = places.mean(axis=1)
+    way = np.ptp(middle, axis=0).max()
+    order = sorted(seen.bones, key=lambda name: len(rig.data.bones[name].parent_recursive))
+    sizes = {name: len(rig.data.bones[name].children_recursive) for name in seen.bones}
+    trees = [name for name in order if rig.data.bones[name].parent is None]
+    main = max(trees, key=sizes.get)
+    order = [name for name in order if name == main or main in (b.name for b in rig.data.bones[name].parent_recursive)]
+    for name in order:
+        own, _ = in_world(seen, [seen.number(name)], units)
+        if np.ptp(own[:, 0] - middle, axis=0).max() <= max(0.3 * way, 0.05):
+            main = name
+            break
+    lowest = min(bones, key=lambda name: float(places[0, bones.index(name), 2]))
+    shown = {"body": main} | ({"lowest": lowest} if lowest != main else {})
+    return Parts({}, shown, {}, {}, "", False)
+
+
+def is_root(rig: bpy.types.Object, parts: Parts) -> bool:
+    """Whether the hips are the topmost bone."""
+    return rig.data.bones[parts.controls["hips"]].parent is None

@@ -1,0 +1,228 @@
+"""What an armature of any kind plays, looked at once: its motion, and how its rig is carried."""
+
+from __future__ import annotations
+
+import re
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ..core import channels
+from ..core.measure import frames_per_second, units_per_metre
+from ..rigs import control_study
+from ..rigs.posing import CHANNELS
+from . import rig_look, rig_parts
+from .rig_look import channel_of
+from .rig_ride import OBJECT, Carried, Rows, channel_values
+
+_OBJECT = {*CHANNELS, *(f"delta_{name}" for name in CHANNELS)}
+BONE = re.compile(r'^pose\.bones\["((?:[^"\\]|\\.)*)"\]\.(\w+)$')
+_MOST = 20000  # frames
+
+
+class RigSource:
+    """A rig as it moves.
+
+    motion: what it shows, metres, at the scene's rate; start: the scene frame of its first frame; told: lines for the
+    user.
+    """
+
+    def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
+        """Looks at every frame of what the rig plays. InputError where it plays nothing, or cannot be carried."""
+        played = Played(rig, scene)
+        self.rig, self.start, self.played, self.told = rig.name, int(played.frames[0]), played, list(played.told)
+        self.units = units_per_metre(scene)
+        with rig_look.alone(rig, scene) as side:
+            seen = rig_look.look(rig, side, played.frames, sorted(played.others))
+            parts = rig_parts.of_rig(rig) or rig_parts.whole(rig, seen, played.object_keyed, self.units)
+            self.motion = rig_parts.motion_of(rig, parts, seen, self.units, frames_per_second(scene))
+            controls = _controls(rig, side, parts, played)
+            rides = control_study.study_rides(rig, side, controls, list(parts.shown.values()))
+        self._rows: Rows | None = None
+        self._ways = seen.lies @ np.linalg.inv(seen.basis)
+        self._hangs = bool(np.ptp(self._ways, axis=0).max() > 1e-6)
+        self.seen, self.carried = seen, Carried(rig, parts, seen, rides, played.object_keyed, self.motion, self.units)
+
+    def values(self, ridden, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
+        """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source,
+        and, where the frames shown are not the source's own, all that is animated."""
+        rows, above = self.rows(ridden), self._above(len(ridden.motion), rig)
+        moves = self.carried.moves(ridden.motion, ridden.rigid, rows, above @ rows.numbers("basis", self.seen.basis))
+        found = {} if rows.same and not self.played.layered else {p: self.own(*p, rows) for p in self.played.places}
+        for (bone, what), values in self.carried.changed(moves, rows).items():
+            number = self.seen.number(bone)
+            mode = self.seen.modes[number]
+            channel = channel_of(mode) if what == "turn" else what
+            if what == "turn":
+                values = channel_values(mode, values, self.seen.channels[channel][rows.low[0], number])
+            found |= columns(f'pose.bones["{bpy.utils.escape_identifier(bone)}"].{channel}', values)
+        if self.carried.object_goes:
+            found |= self._object(moves, rows, above, rig)
+        return found
+
+    def rows(self, ridden) -> Rows:
+        """The source's frames that are shown; the same object as long as they are the same."""
+        at = np.asarray(ridden.frames, float)
+        if self._rows is None or not np.array_equal(at, self._rows.frames):
+            self._rows = Rows(at, len(self.motion))
+        return self._rows
+
+    def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
+        """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked
+        at."""
+        return rows.remembered((path, index), lambda: self._own(path, index, rows))
+
+    def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
+        if (table := self.seen.others.get(path)) is not None:
+            table = table[:, min(index, table.shape[1] - 1)]
+            return (
+                table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
+            )
+        match = BONE.match(path)
+        if match is None or match[2] not in CHANNELS or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
+            return None
+        table = self.seen.channels[match[2]][:, self.seen.number(bpy.utils.unescape_identifier(match[1]))]
+        if match[2] == "rotation_quaternion":
+            table = quaternion.continuous(table)
+        return rows.numbers((path, index, "is"), table[:, index])
+
+    def _above(self, count: int, rig: bpy.types.Object) -> np.ndarray:
+        """What the object hangs on, parents and constraints, on the `count` frames from `start` on: (count, 4, 4)."""
+        if not self._hangs:
+            return np.broadcast_to(self._ways[0], (count, 4, 4))
+        if count > len(self._ways):
+            with rig_look.alone(rig, bpy.context.scene) as side:
+                more = rig_look.look(rig, side, self.start + np.arange(len(self._ways), count))
+            self._ways = np.concatenate([self._ways, more.lies @ np.linalg.inv(more.basis)])
+        return self._ways[:count]
+
+    def _object(self, moves, rows: Rows, above: np.ndarray, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
+        """The object's own location and rotation, where it is the object that goes."""
+        now = rows.numbers("lies", self.seen.lies).copy()
+        now[:, :3, :3] = quaternion.to_matrix(moves.turn[OBJECT]) @ now[:, :3, :3]
+        now[:, :3, 3] = moves.point(OBJECT, now[:, :3, 3] / self.units) * self.units
+        basis = np.linalg.inv(above) @ now
+        mode = rig.rotation_mode
+        delta = quaternion.from_matrix(np.array(
+            rig.delta_rotation_quaternion.to_matrix() if mode == "QUATERNION"
+            else rig.delta_rotation_euler.to_matrix()))
+        turned = quaternion.continuous(quaternion.multiply(quaternion.inverse(delta), rig_parts.rotations(basis)))
+        table = self.seen.others.get(channel_of(mode), np.array([list(getattr(rig, channel_of(mode)))]))
+        location = basis[:, :3, 3] - np.array(rig.delta_location)
+        return columns("location", location) | columns(channel_of(mode), channel_values(mode, turned, table[0]))
+
+
+def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
+    """Values (N, n) of a property, one channel each."""
+    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
+
+
+class Played:
+    """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object
+    and its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches:
+    whether other settings are; layered: see `layered`; told."""
+
+    def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
+        """InputError where it plays nothing."""
+        self.told: list[str] = []
+        found, ends, strips = {}, [], playing_strips(rig)
+        for action, slot, extent in [(*channels.playing(rig), None)] + [
+                (strip.action, strip.action_slot, (strip.frame_start, strip.frame_end)) for strip in strips]:
+            own = {place: curve for place, curve in (channels.curves(action, slot) if slot else {}).items()
+                   if not curve.mute and len(curve.keyframe_points)}
+            if not own:
+                continue
+            found |= own
+            ends.append(extent or channels.keyed_range(own))
+        if not found:
+            raise InputError(
+                f"armature {rig.name}", "it plays no action", "a motion", "import one, or choose an action"
+            )
+        first = int(np.ceil(min(a for a, _ in ends) - 1e-4))
+        last = int(np.floor(max(b for _, b in ends) + 1e-4))
+        if any(_cycles(curve) for curve in found.values()):
+            first, last = min(first, scene.frame_start), max(last, scene.frame_end)
+            self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
+        if not 1 <= last - first < _MOST:
+            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}",
+                             f"2 to {_MOST} frames",
+                             "key more than one frame")
+        self.frames = np.arange(first, last + 1)
+        self.layered = layered(rig)
+        paths = {path for path, _ in found}
+        self.others = {path for path in paths if not _is_posed(path) and _resolves(rig, path)}
+        self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
+        self.switches = any(path not in _OBJECT for path in self.others)
+        self.bones = {
+            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in CHANNELS
+        }
+        self.object_keyed = bool(_OBJECT & paths)
+
+
+def playing_strips(rig: bpy.types.Object, aside: bool = False) -> list:
+    """The NLA strips that play; aside: also while all of them are silent."""
+    data = rig.animation_data
+    if data is None or not data.use_nla and not aside:
+        return []
+    solo = [track for track in data.nla_tracks if track.is_solo]
+    return [strip for track in (solo or data.nla_tracks) if not track.mute or track.is_solo
+            for strip in track.strips if not strip.mute and strip.action is not None]
+
+
+def layered(rig: bpy.types.Object) -> bool:
+    """Whether an armature plays something else than the action on top: strips below it, or a part of it."""
+    data = rig.animation_data
+    part = data.action is not None and (data.action_influence != 1.0 or data.action_blend_type != "REPLACE")
+    return part or bool(playing_strips(rig))
+
+
+def _cycles(curve: bpy.types.FCurve) -> bool:
+    return any(one.type == "CYCLES" and not one.mute for one in curve.modifiers)
+
+
+def _is_posed(path: str) -> bool:
+    match = BONE.match(path)
+    return bool(match and match[2] in CHANNELS)
+
+
+def _resolves(rig: bpy.types.Object, path: str) -> bool:
+    try:
+        value = rig.path_resolve(path)
+        rig_look._numbers(value)
+    except (ValueError, TypeError):
+        return False
+    return True
+
+
+def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Played) -> list[str]:
+    """The bones that may have to be carried: those that are keyed, and of those of the body, the bones that it follows
+    and those that hang on nothing the ones that move anything."""
+    driven = _driven(rig)
+    top = {bone.name for bone in rig.data.bones if bone.parent is None}
+    above = {parts.root, *(b.name for b in rig.data.bones[parts.root].parent_recursive)} if parts.root else set()
+    free = [bone.name for bone in rig.data.bones
+            if (bone.name in top or bone.parent is not None and bone.parent.name in above)
+            and not len(rig.pose.bones[bone.name].constraints)]
+    own = [*parts.controls.values(), *parts.follows, *([parts.root] if parts.root else [])]
+    names = [*sorted(played.bones), *own, *free]
+    names = [name for name in dict.fromkeys(names) if name in rig.data.bones and name not in driven]
+    side.frame_set(int(played.frames[0]))
+    if not played.switches:
+        shown = [bone.name for bone in rig.data.bones if bone.use_deform] or list(rig.data.bones.keys())
+        unkeyed = [name for name in names if name not in played.bones]
+        idle = {name for name, moves in zip(unkeyed, control_study.list_moving(rig, side, unkeyed, shown)) if not moves}
+        names = [name for name in names if name not in idle]
+    return sorted(names, key=lambda name: len(rig.data.bones[name].parent_recursive))
+
+
+def _driven(rig: bpy.types.Object) -> set[str]:
+    """Bones whose place or turn a driver sets."""
+    data = rig.animation_data
+    found = set()
+    for driver in data.drivers if data is not None else ():
+        match = BONE.match(driver.data_path)
+        if match and match[2] in CHANNELS and not driver.mute:
+            found.add(bpy.utils.unescape_identifier(match[1]))
+    return found

@@ -1,0 +1,102 @@
+"""What a rider keeps: an armature whose motion rides a curve. Saved with the file, and known to undo."""
+
+from __future__ import annotations
+
+import json
+
+import bpy
+from bpy.props import BoolProperty, FloatProperty, PointerProperty, StringProperty
+
+from ..core.properties import property_values, with_settings
+from ..result.result import BeyondMocapBefore
+
+
+def is_curve(_ride, candidate: bpy.types.Object) -> bool:
+    """Whether an object may be picked as the new path."""
+    return candidate.type == "CURVE"
+
+
+def is_mesh(_ride, candidate: bpy.types.Object) -> bool:
+    """Whether an object may be picked as the ground."""
+    return candidate.type == "MESH"
+
+
+def follow_pick(ride, context: bpy.types.Context) -> None:
+    """Where a curve is active that nobody rides any more, the one that was picked instead becomes active."""
+    active = context.view_layer.objects.active if context.view_layer is not None else None
+    if not ride.on or ride.curve is None or context.mode != "OBJECT" or active is None or active.type != "CURVE":
+        return
+    if all(body.beyond_mocap_ride.curve != active for body in riders(context.scene)):
+        choose(context, ride.curve)
+
+
+def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
+    """Select one object and nothing else, and make it active, so that Tab edits it."""
+    if thing.name not in context.view_layer.objects:
+        return
+    for other in list(context.selected_objects):
+        other.select_set(False)
+    thing.hide_set(False)
+    thing.select_set(True)
+    context.view_layer.objects.active = thing
+
+
+@with_settings("path_editing")
+class BeyondMocapRide(bpy.types.PropertyGroup):
+    """One armature's path editing."""
+
+    attached_to = ("Object.beyond_mocap_ride",)
+
+    on: BoolProperty(name="Rides", description="Whether the armature's motion rides a curve")
+    curve: PointerProperty(
+        name="New Path", type=bpy.types.Object, poll=is_curve, update=follow_pick,
+        description="The curve object that the motion rides",
+    )
+    before: PointerProperty(type=BeyondMocapBefore, description="The original motion, put aside")
+    added: FloatProperty(
+        name="Added", options={"HIDDEN"}, description="Seconds of the delay that keep it apart from others"
+    )
+    detours: StringProperty(
+        name="Detours", default="[]",
+        description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",
+    )
+    agreed: StringProperty(
+        name="Agreed", options={"HIDDEN"}, description="Digest of what it was when riders were asked to keep apart"
+    )
+    ground: PointerProperty(
+        name="Ground", type=bpy.types.Object, poll=is_mesh,
+        description="A mesh whose surface the feet follow; none: the height of the path itself",
+    )
+    told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
+    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the result as JSON")
+
+
+def wishes(ride: BeyondMocapRide) -> dict:
+    """The settings as arguments of the core's `RideSettings`."""
+    from ...beyond_mocap.path_editing.ride import RideSettings
+
+    found = property_values(RideSettings, ride, "path_editing")
+    found["speed"], found["delay"] = (round(found[name], 6) for name in ("speed", "delay"))  # single precision
+    try:
+        found["detours"] = tuple(tuple(float(value) for value in detour) for detour in json.loads(ride.detours or "[]"))
+    except (TypeError, ValueError):
+        found["detours"] = ()
+    return found
+
+
+def riders(scene: bpy.types.Scene) -> list[bpy.types.Object]:
+    """All armatures of a scene that ride."""
+    if not bpy.data.armatures:
+        return []
+    return [body for body in scene.objects if body.type == "ARMATURE" and body.beyond_mocap_ride.on]
+
+
+def meant(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The riders that a button means, the active one first: the selected ones; with a curve active, all who ride it."""
+    chosen = context.view_layer.objects.active
+    if chosen is None:
+        return []
+    if chosen.type == "CURVE":
+        return [body for body in riders(context.scene) if body.beyond_mocap_ride.curve == chosen]
+    others = [body for body in context.selected_objects if body.type == "ARMATURE" and body != chosen]
+    return [body for body in (chosen, *others) if body.type == "ARMATURE" and body.beyond_mocap_ride.on]

@@ -1,0 +1,1 @@
+"""A player's track, dot, pins and labels in the view."""

@@ -1,0 +1,183 @@
+"""The dots: an Empty for each player that runs along the track in the scene's frames, and one for the ball.
+
+A player's dot carries the strips of its timeline, and what is needed to make it a player again in another file.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.motion.track import Track
+from ..result import bake
+from ..core import channels
+from ..core.clock import Clock, of_scene
+from ..core.measure import units_per_metre
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
+from .tracks import read_track
+
+BALL = "Ball dot"
+MARK = "beyond_mocap_dot"  # on actions that move a dot and may be made anew
+SIZE, BALL_SIZE = 0.4, 0.11  # metres
+BALL_RGB = (0.9, 0.9, 0.9)
+FILES = ("tracking_file", "metadata_file")  # kept whole: a dot may be appended to a file in another folder
+ORIGIN = (*FILES, "feed_id", "provider", "shirt")
+
+
+class BeyondMocapDot(bpy.types.PropertyGroup):
+    """Which player's dot this is: what a file that it is appended to needs to go on with him."""
+
+    attached_to = ("Object.beyond_mocap_dot",)
+
+    player: bpy.props.StringProperty(name="Player", description="The player's name")
+    tracking_file: bpy.props.StringProperty(name="Tracking", description="The file with the player's positions")
+    metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")
+    feed_id: bpy.props.StringProperty(name="ID in the feed", description="Which player of the tracking file this is")
+    provider: bpy.props.StringProperty(name="Provider", description="Whose form the tracking file has")
+    clock: bpy.props.StringProperty(name="Clock", description="Start frame, seconds there and rate of its keys")
+    shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", description="Colour of the player's shirt")
+
+
+def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.Object:
+    """The player's dot, made and animated where there is none; InputError where the track cannot be
+    read."""
+    room = bake.collection(context.scene)
+    if player.dot is not None:
+        if player.dot.name not in context.scene.objects:  # deleted in the view; the player still knows it
+            room.objects.link(player.dot)
+        return player.dot
+    track = read_track(context.scene.beyond_mocap, player)
+    dot = _empty(context.scene, f"{player.name} dot", SIZE, room)
+    player.dot = dot
+    show(player)
+    clock = of_scene(context.scene)
+    seconds, places = _measured(track.times, track.positions)
+    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
+    if BALL not in room.objects:
+        _ball(context.scene, track, room, clock)
+    return dot
+
+
+def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Let the dot run along the player's track as that is now, unless somebody has given it other keys."""
+    dot = player.dot
+    action = channels.playing(dot)[0] if dot is not None else None
+    if action is None or not action.get(MARK):
+        return
+    track = read_track(context.scene.beyond_mocap, player)
+    seconds, places = _measured(track.times, track.positions)
+    channels.discard(dot, MARK)
+    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), of_scene(context.scene))
+
+
+def show(player: BeyondMocapPlayer) -> None:
+    """Let the dot have its player's name and colour, and remember where he comes from."""
+    dot = player.dot
+    if dot is None:
+        return
+    dot.name, dot.color = f"{player.name} dot", (*player.shirt, 1.0)
+    dot.beyond_mocap_dot.player = player.name
+    for name in ORIGIN:
+        value = getattr(player, name)
+        setattr(dot.beyond_mocap_dot, name, absolute(value) if name in FILES else value)
+
+
+def remove(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
+    """Take the player's dot with its strips out of the file; with the last one the ball's too."""
+    dot, player.dot = player.dot, None
+    if dot is not None:
+        _delete(dot)
+    if not any(other.dot for other in scene.beyond_mocap.players):
+        ball = bake.collection(scene).objects.get(BALL)
+        if ball is not None:
+            _delete(ball)
+
+
+def orphans(context: bpy.types.Context) -> list[bpy.types.Object]:
+    """The selected dots of players that are in no list of this scene."""
+    owned = {player.dot for player in context.scene.beyond_mocap.players}
+    return [dot for dot in context.selected_objects if dot.beyond_mocap_dot.player and dot not in owned]
+
+
+def adopt(settings: BeyondMocapSettings, dot: bpy.types.Object, name: str) -> BeyondMocapPlayer:
+    """A new player of this scene, to whom the dot belongs."""
+    origin = {key: getattr(dot.beyond_mocap_dot, key) for key in ORIGIN}
+    player = settings.players.add()
+    for key, value in origin.items():
+        setattr(player, key, as_setting(value) if key in FILES and value else value)
+    player.dot = dot
+    player.name = name
+    settings.active_player = len(settings.players) - 1
+    return player
+
+
+def first_second(dot: bpy.types.Object) -> float:
+    """What the track's clock shows at the dot's first key."""
+    clock, frames = Clock.read(dot.beyond_mocap_dot.clock), keyed_frames(dot)
+    return clock.seconds(frames[0]) if clock and frames else 0.0
+
+
+def relay(dot: bpy.types.Object, new: Clock) -> bool:
+    """Move a dot's keys to the frames of another clock; whether there was anything to do."""
+    old = Clock.read(dot.beyond_mocap_dot.clock)
+    action, slot = channels.playing(dot)
+    if old is None or old == new or action is None or not action.get(MARK):
+        return False
+    for curve in channels.curves(action, slot).values():
+        keys = np.empty(2 * len(curve.keyframe_points), np.float32)
+        curve.keyframe_points.foreach_get("co", keys)
+        seconds = old.start_time + (keys[::2].astype(float) - old.start_frame) / old.fps
+        keys[::2] = new.start_frame + (seconds - new.start_time) * new.fps
+        curve.keyframe_points.foreach_set("co", keys)
+        curve.update()
+    dot.beyond_mocap_dot.clock = new.spelled()
+    return True
+
+
+def keyed_frames(dot: bpy.types.Object) -> tuple[float, float] | None:
+    """First and last frame on which the dot has a key; None where it has none."""
+    action, slot = channels.playing(dot)
+    ends = [curve.range() for curve in channels.curves(action, slot).values()] if action else []
+    return (min(low for low, _ in ends), max(high for _, high in ends)) if ends else None
+
+
+def _ball(scene: bpy.types.Scene, track: Track, room: bpy.types.Collection, clock: Clock) -> None:
+    places = np.where(np.isnan(track.ball), [np.nan, np.nan, BALL_SIZE], track.ball)
+    seconds, places = _measured(track.times, places)
+    if len(seconds):
+        dot = _empty(scene, BALL, BALL_SIZE, room)
+        dot.color = (*BALL_RGB, 1.0)
+        _animate(scene, dot, seconds, places, clock)
+
+
+def _empty(scene: bpy.types.Scene, name: str, size: float, room: bpy.types.Collection) -> bpy.types.Object:
+    dot = bpy.data.objects.new(name, None)
+    dot.empty_display_type, dot.empty_display_size = "SPHERE", size * units_per_metre(scene)
+    dot.show_name = True
+    room.objects.link(dot)
+    return dot
+
+
+def _measured(times: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The samples that have a time and a place, each time once, in order."""
+    known = np.isfinite(times) & np.isfinite(places).all(axis=1)
+    seconds, first = np.unique(times[known], return_index=True)
+    return seconds, places[known][first]
+
+
+def _animate(scene: bpy.types.Scene, dot: bpy.types.Object, seconds: np.ndarray, places: np.ndarray, clock: Clock):
+    """A key for each sample: seconds (N,), places (N, 3) metres."""
+    frames = clock.start_frame + (seconds - clock.start_time) * clock.fps
+    curves = {"location": ("Object Transforms", places * units_per_metre(scene))}
+    channels.animate(dot, f"{dot.name} track", frames, curves)[MARK] = True
+    dot.beyond_mocap_dot.clock = clock.spelled()
+
+
+def _delete(dot: bpy.types.Object) -> None:
+    """Remove an object and the actions that only it plays."""
+    data = dot.animation_data
+    actions = {strip.action for track in data.nla_tracks for strip in track.strips} | {data.action} if data else set()
+    bpy.data.objects.remove(dot)
+    for action in actions - {None}:
+        if action.users == 0:
+            bpy.data.actions.remove(action)

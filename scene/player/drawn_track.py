@@ -1,0 +1,214 @@
+"""Tracks that are drawn or animated in Blender: a curve with a speed at each point, or any object that moves.
+
+The speed of a control point, in metres per second, is its Radius (Item tab, Alt-S), and the seconds that are waited at
+a point of speed 0 its Weight: both are kept with the point when the curve is subdivided or cut, and saved by Blender
+itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.vectors import distance_along
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.motion.track import Track
+from ...beyond_mocap.motion.track.drawn import along, moved, nurbs_line
+from ..rigs import armature
+from ..core import channels
+from ..core.clock import of_scene
+from ..core.measure import units_per_metre
+
+FINE = 48  # straight pieces that a Bezier segment is cut into
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """A curve on the ground. line (N, 3) m in the world; at (P,) index into it of each control point; speeds (P,) m/s;
+    waits (P,) s."""
+
+    line: np.ndarray
+    at: np.ndarray
+    speeds: np.ndarray
+    waits: np.ndarray
+
+
+NO_LINE = Line(np.empty((0, 3)), np.empty(0, int), np.empty(0), np.empty(0))
+MOST_PLAYED = 32
+_played: dict[tuple[int, int], tuple] = {}  # (scene, object) by session_uid: stamp, frames, places
+
+
+def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, still: bool = False) -> Track:
+    """The track that a curve or a moving object is; start: seconds on the track's clock at which a curve begins.
+    InputError where it is none.
+
+    still: leave the scene on its frame. What moves by more than its own keys has to be played frame by frame, which
+    takes time and undoes a pose that has no key yet; then what was read last counts, InputError where there is none.
+    """
+    if drawn.type == "CURVE":
+        found = line_of(scene, drawn)
+        level = found.line[:, :2]
+        way = distance_along(level)
+        return along(level, way[found.at], found.speeds, found.waits, start, f"curve {drawn.name}")
+    if drawn.type == "CURVES":
+        raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
+    frames, places = _animated(scene, drawn, still)
+    clock = of_scene(scene)
+    seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
+    return moved(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
+
+
+def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
+    """The first spline of a curve object, as it is drawn now, also in edit mode; InputError where it is no open
+    line."""
+    spline = next((spline for spline in drawn.data.splines if len(points_of(spline)) > 1), None)
+    if spline is None:
+        raise InputError(f"curve {drawn.name}", "no line", "two points or more", "add points in edit mode")
+    if spline.use_cyclic_u:
+        raise InputError(f"curve {drawn.name}", "a closed curve", "a beginning and an end", "switch Cyclic off (Alt-C)")
+    points = points_of(spline)
+    if spline.type == "BEZIER":
+        local, at = _bezier(points)
+    elif spline.type == "POLY":
+        local, at = _values(points, "co", 4)[:, :3], np.arange(len(points))
+    else:
+        places, weights = _values(points, "co", 4)[:, :3], _values(points, "weight", 1)
+        local, at = nurbs_line(places, weights, spline.order_u, spline.use_endpoint_u, FINE)
+    world = np.array(drawn.matrix_world)
+    line = (local @ world[:3, :3].T + world[:3, 3]) / units_per_metre(scene)
+    return Line(line, at, _values(points, "radius", 1), _values(points, "weight_softbody", 1))
+
+
+def points_of(spline: bpy.types.Spline):
+    """A spline's control points, of whichever kind it is."""
+    return spline.bezier_points if spline.type == "BEZIER" else spline.points
+
+
+def set_speed(points, speed: float, wait: float) -> None:
+    """Give control points a speed in m/s and, for those that are stops, a wait in seconds."""
+    for point in points:
+        point.radius, point.weight_softbody = speed, max(wait, 0.01)
+
+
+def create(context: bpy.types.Context, name: str, collection) -> bpy.types.Object:
+    """A Bezier curve to begin with, from the 3D cursor on along X: a start from a stand, a bow, a stop."""
+    units = units_per_metre(context.scene)
+    origin = np.array(context.scene.cursor.location) * [1.0, 1.0, 0.0]
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions, data.bevel_depth = "3D", 0.0
+    spline = data.splines.new("BEZIER")
+    places = np.array([[0.0, 0.0, 0.0], [6.0, 1.5, 0.0], [12.0, 0.0, 0.0], [18.0, -1.5, 0.0]]) * units
+    spline.bezier_points.add(len(places) - 1)
+    for point, place, speed in zip(spline.bezier_points, places, (0.0, 3.0, 3.0, 0.0)):
+        point.co, point.radius, point.weight_softbody = origin + place, speed, 0.5
+        point.handle_left_type = point.handle_right_type = "AUTO"
+    drawn = bpy.data.objects.new(name, data)
+    collection.objects.link(drawn)
+    context.view_layer.update()  # handles
+    return drawn
+
+
+def _values(points, name: str, size: int) -> np.ndarray:
+    out = np.empty(size * len(points), np.float32)
+    points.foreach_get(name, out)
+    return out.reshape(-1, size).astype(float) if size > 1 else out.astype(float)
+
+
+def _bezier(points) -> tuple[np.ndarray, np.ndarray]:
+    """The line (N, 3) through Bezier points, and where on it they are."""
+    co, left, right = (_values(points, name, 3) for name in ("co", "handle_left", "handle_right"))
+    t = np.linspace(0.0, 1.0, FINE + 1)[:-1, None, None]
+    a, b, c, d = co[:-1], right[:-1], left[1:], co[1:]
+    fine = (1 - t) ** 3 * a + 3 * t * (1 - t) ** 2 * b + 3 * t**2 * (1 - t) * c + t**3 * d
+    line = np.concatenate([fine.transpose(1, 0, 2).reshape(-1, 3), co[-1:]])
+    return line, FINE * np.arange(len(co))
+
+
+def _animated(scene: bpy.types.Scene, moving: bpy.types.Object, still: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Frames (F,) and places (F, 3), in Blender's units, of a moving object: of an armature its hips, or else its first
+    bone."""
+    own = _own_keys(moving)
+    if own is not None:
+        return own
+    key, stamp = (scene.session_uid, moving.session_uid), _stamp(scene, moving)
+    if still:
+        if key not in _played or _played[key][0] != stamp:
+            raise InputError(f"object {moving.name}", "not played since it was opened or changed", "its motion",
+                             "press Update, which plays it")
+        return _played[key][1:]
+    frames, places = _play(scene, moving)
+    _played.pop(key, None)
+    _played[key] = stamp, frames, places
+    if len(_played) > MOST_PLAYED:
+        del _played[next(iter(_played))]
+    return frames, places
+
+
+def _stamp(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple:
+    """What is another where an object's own keys or the frames in which it moves have changed."""
+    action, slot = channels.playing(moving)
+    keys = (
+        [channels.keys_of(curve)["co"].tobytes() for curve in channels.curves(action, slot).values()] if action else []
+    )
+    return *_range(scene, moving), hash(tuple(keys))
+
+
+def _play(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """The same, read by playing the scene."""
+    first, last = _range(scene, moving)
+    frames = np.arange(first, last + 1, dtype=float)
+    bone = _hips(scene, moving) if moving.type == "ARMATURE" else None
+    before, places = (scene.frame_current, scene.frame_subframe), np.empty((len(frames), 3))
+    try:
+        for number, frame in enumerate(frames):
+            scene.frame_set(int(frame))
+            shown = moving.evaluated_get(bpy.context.evaluated_depsgraph_get())
+            place = shown.matrix_world.translation
+            if bone is not None:
+                place = shown.matrix_world @ shown.pose.bones[bone].head
+            places[number] = place
+    finally:
+        scene.frame_set(before[0], subframe=before[1])
+    return frames, places
+
+
+def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
+    """The same read off its own curves, which is quick, where nothing else moves it; None where something does."""
+    action, slot = channels.playing(moving)
+    data = moving.animation_data
+    if action is None or moving.type == "ARMATURE" or moving.parent or moving.constraints or data.drivers:
+        return None
+    if data.nla_tracks or moving.delta_location.length:
+        return None
+    curves = channels.curves(action, slot)
+    ends = channels.keyed_range(curves)
+    if ends is None:
+        return None
+    frames = np.arange(ends[0], ends[1] + 1, dtype=float)
+    columns = [
+        channels.sample(curves["location", axis], frames) if ("location", axis) in curves
+        else np.full(len(frames), moving.location[axis])
+        for axis in range(3)
+    ]
+    return frames, np.stack(columns, axis=1)
+
+
+def _range(scene: bpy.types.Scene, moving: bpy.types.Object) -> tuple[int, int]:
+    """The frames in which it moves: those of its own keys, else the scene's."""
+    action, slot = channels.playing(moving)
+    ends = channels.keyed_range(channels.curves(action, slot)) if action else None
+    return ends or (scene.frame_start, scene.frame_end)
+
+
+def _hips(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
+    """The bone that is the pelvis, or the first without a parent."""
+    try:
+        skeleton = armature.skeleton_of(moving, scene)
+        return skeleton.names[identify(skeleton).hips]
+    except InputError:
+        if not moving.data.bones:
+            raise
+        return next(bone.name for bone in moving.data.bones if bone.parent is None)

@@ -1,0 +1,118 @@
+"""Pins in the scene: an Empty for each place where a player's hand, foot or gaze has to be, with its time and hold."""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+from bpy.props import EnumProperty, FloatProperty, PointerProperty
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion.humanoid import identify
+from ...beyond_mocap.synthesis.plan import Pin
+from ..rigs import armature
+from ..core.clock import of_scene
+from ..core.measure import units_per_metre
+
+PARTS = (
+    ("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
+    ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
+    ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
+    ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
+    ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4),
+)
+SIZE = 0.12  # metres
+AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
+
+
+class BeyondMocapPin(bpy.types.PropertyGroup):
+    """One pin of a player; its name is the part's."""
+
+    target: PointerProperty(
+        name="Place", type=bpy.types.Object, description="The Empty that says where; move it with G"
+    )
+    part: EnumProperty(name="Part", items=PARTS, description="What is held there")
+    time: FloatProperty(
+        name="Time", unit="TIME_ABSOLUTE", precision=2, description="Second on the track's clock at which it is there"
+    )
+    hold: FloatProperty(
+        name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
+        description="Seconds for which it stays there; 0: a moment",
+    )
+
+
+def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
+    """A player's pins whose Empties are in the scene."""
+    metres = 1.0 / units_per_metre(scene)
+    found = []
+    for pin in player.pins:
+        if pin.target is not None and pin.target.name in scene.objects:
+            place = np.array(pin.target.matrix_world.translation, dtype=float) * metres
+            found.append(Pin(round(pin.time, 6), pin.part, tuple(np.round(place, 6)), round(pin.hold, 6)))
+    return tuple(found)
+
+
+def add(context: bpy.types.Context, player, part: str, seconds: float, hold: float, place, room) -> bpy.types.Object:
+    """A new pin at `place` (3,) metres; returns its Empty, which is chosen and active."""
+    units = units_per_metre(context.scene)
+    target = bpy.data.objects.new(f"{player.name} {part.replace('_', ' ')}", None)
+    target.empty_display_type = "SINGLE_ARROW" if part == "gaze" else "SPHERE"
+    target.empty_display_size, target.show_name = SIZE * units, True
+    target.color = (*player.shirt, 1.0)
+    target.location = np.asarray(place) * units
+    room.objects.link(target)
+    pin = player.pins.add()
+    pin.name, pin.target, pin.part, pin.time, pin.hold = target.name, target, part, seconds, hold
+    player.active_pin = len(player.pins) - 1
+    context.view_layer.update()
+    if target.name in context.view_layer.objects:  # else its collection is excluded
+        for other in context.selected_objects:
+            other.select_set(False)
+        target.select_set(True)
+        context.view_layer.objects.active = target
+    return target
+
+
+def remove(player, number: int) -> None:
+    """Take a pin and its Empty out of the file."""
+    target = player.pins[number].target
+    player.pins.remove(number)
+    player.active_pin = max(0, min(player.active_pin, len(player.pins) - 1))
+    if target is not None:
+        bpy.data.objects.remove(target)
+
+
+def remove_all(player) -> None:
+    """Take all of a player's pins out of the file."""
+    for number in reversed(range(len(player.pins))):
+        remove(player, number)
+
+
+def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
+    """Where the player's part is on the present frame, or AHEAD metres before his face: (3,) metres in the world."""
+    if player.body is None:
+        raise InputError(
+            f"player {player.name}", "no body", "a body to pin", "Synthesize first, or pin at the 3D cursor"
+        )
+    skeleton = armature.skeleton_of(player.body, context.scene)
+    body = identify(skeleton)
+    sides = {"left": body.left, "right": body.right}
+    side, _, what = part.partition("_")
+    joint = body.head if part == "gaze" else getattr(sides[side], what)
+    if joint is None:
+        raise InputError(f"armature {player.body.name}", f"no bone for {part}", "a humanoid", "choose another part")
+    shown = player.body.evaluated_get(context.evaluated_depsgraph_get())
+    units = units_per_metre(context.scene)
+
+    def place(number: int) -> np.ndarray:
+        return np.array(shown.matrix_world @ shown.pose.bones[skeleton.names[number]].head) / units
+
+    if part != "gaze":
+        return place(joint)
+    across = place(body.left.upper_leg) - place(body.right.upper_leg)
+    ahead = np.array([across[1], -across[0], 0.0])
+    return place(joint) + AHEAD * ahead / max(np.linalg.norm(ahead), 1e-9)
+
+
+def second_now(scene: bpy.types.Scene) -> float:
+    """What the track's clock shows on the scene's present frame."""
+    return of_scene(scene).seconds(scene.frame_current_final)

@@ -1,0 +1,1 @@
+"""Orders, previews, variants, quality of takes and what is out of date."""

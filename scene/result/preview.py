@@ -1,0 +1,314 @@
+"""A take shown on its player, to be kept or put away: what was there before is set aside and comes back exactly.
+
+The ball and the stage's camera belong to all players together: they follow the takes that are shown just now.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...beyond_mocap.base.errors import InputError
+from . import bake, blocks, error_curves, hand_keys
+from ..core import channels, linked, session
+from ..stage import stage
+from .bake import MARK
+from ..core.clock import of_scene
+from ..passes import possession
+from ..path_editing import riders
+from ..core.set_aside import bring_back, drop, play_as_before, put_aside
+from ..core.settings import BeyondMocapPlayer
+
+STEPS = ("recipe", "made_of")
+LINES = ("take", "quality", "moments", "warnings")
+
+
+def check(player: BeyondMocapPlayer) -> None:
+    """InputError where the player's body cannot be animated here."""
+    body = player.body
+    if body is None:
+        return
+    linked.refuse(body)
+    override = body.override_library
+    if override is not None and override.is_system_override:
+        raise InputError(f"body {body.name}", "an override that cannot be edited", "an editable override",
+                         "make it editable: Outliner, Library Override, Make")
+
+
+def off_path(player: BeyondMocapPlayer) -> list[str]:
+    """A body that rides a path plays its own motion again, before its result is another; a line about it."""
+    return riders.leave(player.body)
+
+
+def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
+    """Put the session's take of that name onto the player's armature, made where it is missing, and set aside what was
+    there; lines: `quality`, `moments`, `warnings`, `recipe` and `made_of` of the take. Returns the armature."""
+    made, result = session.made(take), player.result
+    check(player)
+    left = off_path(player)
+    if result.state != "NONE" and not shown(context.scene, player):
+        forget(player)
+    hand, clock = hand_keys.Hand(), ""
+    if context.scene.beyond_mocap.keep_hand_keys and player.body is not None and result.state != "NONE":
+        hand, clock = hand_keys.of_body(player.body)
+    if result.state != "PREVIEW":
+        _remember(context, player, made)
+    player.take = take
+    for name, text in lines.items():
+        setattr(result if name in STEPS else player, name, text)
+    if left:
+        player.warnings = "\n".join(filter(None, [player.warnings, *left]))
+    with _shared_length(context.scene):
+        body = bake.player(context, player, made)
+    action, slot = channels.playing(body)
+    blocks.note(action, made.take, context.scene)
+    hand_keys.note(action, slot, of_scene(context.scene))
+    moved = hand_keys.shift_between(clock, of_scene(context.scene))
+    result.hand_keys = hand_keys.put(action, slot, hand, moved) if moved is not None else 0
+    result.state = "PREVIEW"
+    error_curves.renew(context.scene, player)
+    share(context)
+    return body
+
+
+def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bpy.types.Object:
+    """Accept what is shown on a player, as one action ("ACTION") or as NLA strips ("STRIPS"); what had been set aside
+    for it and was ours is removed. Returns the armature."""
+    result, body = player.result, player.body
+    off_path(player)
+    if result.motion.kept and body.animation_data is not None:
+        play_as_before(result.motion, body.animation_data)
+    if form == "STRIPS":
+        blocks.as_strips(body, context.scene)
+    else:
+        blocks.as_action(body, context.scene)
+    _settle(player)
+    result.state = "ACCEPTED"
+    _keep_shared(context)
+    _name(context, player)
+    return body
+
+
+def _keep_shared(context: bpy.types.Context) -> None:
+    _with_free_ball(context, _keep_free)
+
+
+def _with_free_ball(context: bpy.types.Context, change) -> None:
+    """Call `change(context)` while nobody carries the ball; who did carries it afterwards too."""
+    room = context.scene.collection.children.get(bake.COLLECTION)
+    ball = room.objects.get(bake.BALL) if room is not None else None
+    if ball is None or not len(ball.beyond_mocap_ball.holds):
+        return change(context)
+    possession.anew(context.scene, ball, lambda: change(context))
+
+
+def _keep_free(context: bpy.types.Context) -> None:
+    """Ball and camera stay with what has been accepted: that is what comes back when previews of others are
+    discarded."""
+    shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
+    others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
+    if not others or bake.ball_of(takes, context.scene.beyond_mocap) is not None:
+        drop(shared.ball, MARK)
+    drop(shared.camera, stage.MARK)
+    shared.end_set = 0
+    if others:
+        _follow(context, takes)
+        share(context)
+
+
+def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Plain names for what has been kept, now that what had them before is gone."""
+    playing = channels.playing(player.body)[0]
+    if playing is not None and playing.get(MARK) and playing.library is None:
+        playing.name = f"{player.name} take"
+    room = bake.collection(context.scene)
+    ribbon, ball = room.objects.get(bake.track_name(player)), room.objects.get(bake.BALL)
+    if ribbon is not None:
+        ribbon.data.name = bake.track_name(player)
+    path = channels.playing(ball)[0] if ball is not None else None
+    if path is not None and path.get(MARK):
+        path.name = f"{bake.BALL} path"
+
+
+def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Take the preview off a player: what was there before is there again, to the last bit."""
+    result, body = player.result, player.body
+    off_path(player)
+    accepted = result.was_accepted
+    if body is not None and body == result.body and result.motion.kept:
+        _undress(context, player)
+        bring_back(result.motion, body, MARK)
+    else:
+        _undress(context, player)
+        if body is not None:
+            error_curves.remove(body)
+            _remove_armature(body)
+        player.body = result.body
+    for name in LINES:
+        setattr(player, name, getattr(result, name))
+    for name in STEPS:
+        setattr(result, name, getattr(result, f"{name}_before"))
+    _settle(player)
+    result.state = "ACCEPTED" if accepted else "NONE"
+    error_curves.renew(context.scene, player)
+    share(context)
+
+
+def shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
+    """Whether the player's result is on a body in the scene."""
+    there = player.body is not None and player.body.name in scene.objects
+    return there and player.result.state != "NONE"
+
+
+def forget(player: BeyondMocapPlayer) -> None:
+    """The preview's body is gone: nothing can be brought back to it."""
+    _settle(player)
+    player.result.state = "NONE"
+
+
+def share(context: bpy.types.Context) -> None:
+    """Let ball and camera follow the takes that are shown; with the last preview what they did before
+    comes back."""
+    _with_free_ball(context, _share_free)
+
+
+def _share_free(context: bpy.types.Context) -> None:
+    scene, settings = context.scene, context.scene.beyond_mocap
+    shared = settings.shared
+    takes = _takes(settings.players, "ACCEPTED", "PREVIEW")
+    previews = any(player.result.state == "PREVIEW" for player in settings.players)
+    room = scene.collection.children.get(bake.COLLECTION)
+    ball = room.objects.get(bake.BALL) if room is not None else None
+    focus = stage.focus(scene)
+    if not previews:
+        _as_before(scene, shared, ball, focus)
+        return
+    made_now, wanted = ball is None, bake.ball_of(takes, settings) is not None
+    if wanted and not made_now and not shared.ball.kept:
+        put_aside(shared.ball, ball)
+    if takes and focus is not None and not shared.camera.kept:
+        put_aside(shared.camera, focus)
+    _follow(context, takes)
+    if wanted and made_now:
+        shared.ball.kept = shared.ball.made = True
+
+
+def _takes(players, *states: str) -> list:
+    """The takes of players whose result is in one of these states, as far as this session has them."""
+    found = [session.made(player.take) for player in players if player.result.state in states]
+    return [made.take for made in found if made is not None]
+
+
+def _follow(context: bpy.types.Context, takes: list) -> None:
+    """Let ball and camera follow these takes."""
+    path = bake.ball_of(takes, context.scene.beyond_mocap)
+    if path is not None:
+        bake.the_ball(context, path)
+    if takes and stage.focus(context.scene) is not None:
+        bake.camera(context.scene, takes)
+
+
+def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
+    if shared.ball.kept and ball is not None:
+        if shared.ball.made:
+            _remove(ball)
+        else:
+            bring_back(shared.ball, ball, MARK)
+    if shared.camera.kept and focus is not None:
+        bring_back(shared.camera, focus, stage.MARK)
+    drop(shared.ball, MARK)
+    drop(shared.camera, stage.MARK)
+    if shared.end_set and scene.frame_end == shared.end_set:
+        scene.frame_end = shared.end_before
+    shared.end_set = 0
+
+
+class _shared_length:
+    """Notes, for the length of a `with`, by how much a preview lengthens the scene."""
+
+    def __init__(self, scene: bpy.types.Scene):
+        self.scene, self.shared, self.before = scene, scene.beyond_mocap.shared, scene.frame_end
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        if self.scene.frame_end == self.before:
+            return
+        if not self.shared.end_set:
+            self.shared.end_before = self.before
+        self.shared.end_set = self.scene.frame_end
+
+
+def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: session.Made) -> None:
+    """Note what a preview will take the place of, and set the body's motion aside."""
+    result, body, room = player.result, player.body, bake.collection(context.scene)
+    result.was_accepted = result.state == "ACCEPTED"
+    result.body = body
+    for name in LINES:
+        setattr(result, name, getattr(player, name))
+    for name in STEPS:
+        setattr(result, f"{name}_before", getattr(result, name))
+    fits = body is not None and bake.fits(body, made.take, context.scene)
+    result.mesh_made = not fits or not any(child.type == "MESH" for child in body.children)
+    ribbon = room.objects.get(bake.track_name(player))
+    result.track_made = ribbon is None
+    result.track = ribbon.data if ribbon is not None and ribbon.type == "CURVE" else None
+    if fits:
+        put_aside(result.motion, body)
+
+
+def _settle(player: BeyondMocapPlayer) -> None:
+    """Keep nothing of before any more; what was ours and nobody else uses goes."""
+    result = player.result
+    drop(result.motion, MARK)
+    track, result.track = result.track, None
+    if track is not None and not track.users:
+        bpy.data.curves.remove(track)
+    result.variants.clear()
+    for name in ("body", "mesh_made", "track_made", "was_accepted", *LINES, *(f"{name}_before" for name in STEPS)):
+        result.property_unset(name)
+
+
+def _undress(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Take away the mesh and the track that a preview made, or put back the track that was there."""
+    result, body = player.result, player.body
+    room = bake.collection(context.scene)
+    if result.mesh_made and body is not None:
+        for child in [child for child in body.children if child.get(MARK)]:
+            _remove(child)
+    ribbon = room.objects.get(bake.track_name(player))
+    if ribbon is None:
+        return
+    if result.track_made:
+        _remove(ribbon)
+    elif result.track is not None and ribbon.data != result.track:
+        made, ribbon.data = ribbon.data, result.track
+        _remove_data(made)
+
+
+def _remove_armature(body: bpy.types.Object) -> None:
+    """Remove an armature that a preview made, with its action; one to which the user has tied things stays, and so does
+    one of another file."""
+    if body.library is not None:
+        return
+    channels.discard(body, MARK)
+    if not body.children and body.get(MARK):
+        _remove(body)
+
+
+def _remove(thing: bpy.types.Object) -> None:
+    """Remove an object of ours, its data and its materials where nobody else uses them."""
+    data = thing.data
+    channels.discard(thing, MARK)
+    bpy.data.objects.remove(thing)
+    _remove_data(data)
+
+
+def _remove_data(data) -> None:
+    if data.users:
+        return
+    materials = {material for material in getattr(data, "materials", ()) if material is not None}
+    bpy.data.batch_remove([data])
+    unworn = [material for material in materials if not material.users and material.get(MARK)]
+    if unworn:
+        bpy.data.batch_remove(unworn)

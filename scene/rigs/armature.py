@@ -1,0 +1,221 @@
+"""Skeletons as armatures, and armatures as skeletons.
+
+A joint becomes a bone of the same name whose head is the joint. The core's joints have no rotation at rest, Blender's
+bones point somewhere: `rest_rotations` is the difference, and the only thing `action` needs to translate poses.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.humanoid import side_and_part
+from ...beyond_mocap.motion.skeleton import Skeleton
+from ..core.measure import units_per_metre
+
+PROPERTY = "beyond_mocap_skeleton"
+STUB = 0.04  # metres: length of a bone that leads nowhere
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """How an armature's own space lies in the scene's metres.
+
+    rotation: (4,) unit quaternion. origin: (3,) metres. scale: metres per unit of the armature's space.
+    """
+
+    rotation: np.ndarray
+    origin: np.ndarray
+    scale: float
+
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) of the armature's space -> metres in the scene's world."""
+        return quaternion.rotate(self.rotation, np.asarray(points) * self.scale) + self.origin
+
+    def to_armature(self, points: np.ndarray) -> np.ndarray:
+        """Metres in the scene's world (..., 3) -> points of the armature's space."""
+        return quaternion.rotate(quaternion.inverse(self.rotation), np.asarray(points) - self.origin) / self.scale
+
+
+def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
+    """A new armature object with one bone per joint, its lowest joint on the floor, in `collection` or the scene's own.
+
+    The exact offsets in metres, the order of the joints and the tips go along as a custom property of the armature.
+    """
+    scene = context.scene
+    units = units_per_metre(scene)
+    data = bpy.data.armatures.new(name)
+    data.display_type = "WIRE"
+    body = bpy.data.objects.new(name, data)
+    scene.collection.objects.link(body)
+    places, tails = skeleton.rest_positions, _tails(skeleton)
+    places = places - [0.0, 0.0, min(places[:, 2].min(), (places + tails)[:, 2].min())]
+    with _editing(context, body):
+        for joint, joint_name in enumerate(skeleton.names):
+            bone = data.edit_bones.new(joint_name)
+            bone.head = places[joint] * units
+            bone.tail = (places[joint] + tails[joint]) * units
+            bone.align_roll(_roll_target(tails[joint]))
+            if joint:
+                bone.parent = data.edit_bones[skeleton.names[skeleton.parents[joint]]]
+    for bone in body.pose.bones:
+        bone.rotation_mode = "QUATERNION"
+    data[PROPERTY] = json.dumps(_as_table(skeleton, units))
+    if collection is not None and collection != scene.collection:
+        collection.objects.link(body)
+        scene.collection.objects.unlink(body)
+    context.view_layer.update()
+    return body
+
+
+def skeleton_of(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
+    """The skeleton of an armature object, in metres, as it rests in the armature's own space.
+
+    An armature made by `create` gives back exactly the skeleton that went in, as long as nobody has edited its bones.
+    Any other is read off its rest pose: one joint per bone of the largest tree, a tip on every bone without children.
+    """
+    if body is None or body.type != "ARMATURE" or not len(body.data.bones):
+        raise InputError("armature", "no bones", "an armature object", "select one in the 3D view")
+    derived = _from_bones(body, scene)
+    kept = _kept(body, scene)
+    if kept is None or set(kept.names) != set(derived.names):
+        return derived
+    order = [derived.names.index(name) for name in kept.names]
+    same_parents = all(
+        parent < 0 or derived.names[derived.parents[at]] == kept.names[parent]
+        for at, parent in zip(order, kept.parents, strict=True)
+    )
+    size = max(1.0, float(np.abs(kept.offsets).max()))
+    same = same_parents and np.allclose(derived.offsets[order], kept.offsets, atol=1e-5 * size)
+    return kept if same else derived
+
+
+def placement(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
+    """How the armature's space lies in the scene; InputError where its scale is uneven, which turns bones askew."""
+    bpy.context.view_layer.update()  # a script may have moved it a line ago
+    return placement_now(body, scene)
+
+
+def placement_now(body: bpy.types.Object, scene: bpy.types.Scene) -> Placement:
+    """The same as Blender has worked it out last, which is quick."""
+    origin, rotation, scale = body.matrix_world.decompose()
+    if min(scale) <= 0.0 or max(scale) > 1.001 * min(scale):
+        raise InputError(f"object {body.name}", f"scale {tuple(round(s, 4) for s in scale)}", "one positive scale",
+                         "apply it with Ctrl-A, Scale")
+    metres = 1.0 / units_per_metre(scene)
+    return Placement(np.array(rotation), np.array(origin) * metres, float(np.mean(scale)) * metres)
+
+
+def rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray:
+    """Rotations (J, 4) of the named bones at rest, in the armature's space."""
+    return quaternion.from_matrix(np.array([body.data.bones[name].matrix_local.to_3x3() for name in names]))
+
+
+class _editing:
+    """Edit mode on one armature for the length of a `with`; the active object and its mode come back afterwards."""
+
+    def __init__(self, context, body):
+        self.context, self.body = context, body
+
+    def __enter__(self):
+        objects = self.context.view_layer.objects
+        self.before = objects.active
+        self.mode = self.before.mode if self.before is not None else "OBJECT"
+        if self.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode="OBJECT")
+        objects.active = self.body
+        bpy.ops.object.mode_set(mode="EDIT")
+
+    def __exit__(self, *error):
+        bpy.ops.object.mode_set(mode="OBJECT")
+        self.context.view_layer.objects.active = self.before
+        if self.mode != "OBJECT":
+            bpy.ops.object.mode_set(mode=self.mode)
+
+
+def _tails(skeleton: Skeleton) -> np.ndarray:
+    """From each joint to its bone's tail, metres (J, 3): toward the joints or tips that carry the limb on."""
+    tails = np.zeros((len(skeleton), 3))
+    for joint in range(len(skeleton)):
+        onward = _onward(skeleton, joint)
+        mean = onward.mean(axis=0) if len(onward) else np.zeros(3)
+        if np.linalg.norm(mean) < 0.25 * STUB and len(onward):
+            mean = max(onward, key=np.linalg.norm)
+        length = np.linalg.norm(mean)
+        if length < 1e-4:
+            mean, length = _incoming(skeleton, joint), 1.0
+            mean = mean * STUB
+        tails[joint] = mean
+    return tails
+
+
+def _onward(skeleton: Skeleton, joint: int) -> np.ndarray:
+    """Offsets (n, 3) of the children on the joint's own side (the neck, not the shoulders), else of all, else tips."""
+    children = skeleton.children(joint)
+    side = side_and_part(skeleton.names[joint])[0]
+    along = [c for c in children if side_and_part(skeleton.names[c])[0] == side] or children
+    if along:
+        return skeleton.offsets[list(along)]
+    return skeleton.end_offsets[[i for i, parent in enumerate(skeleton.end_parents) if parent == joint]]
+
+
+def _incoming(skeleton: Skeleton, joint: int) -> np.ndarray:
+    """Unit direction (3,) in which the limb comes to this joint; up where there is none."""
+    while joint > 0:
+        length = np.linalg.norm(skeleton.offsets[joint])
+        if length > 1e-4:
+            return skeleton.offsets[joint] / length
+        joint = skeleton.parents[joint]
+    return np.array([0.0, 0.0, 1.0])
+
+
+def _roll_target(tail: np.ndarray) -> Vector:
+    """Where a bone's Z axis looks: forward along X, or up for bones that themselves point forward, as feet do."""
+    forward = abs(tail[0]) > 0.7 * np.linalg.norm(tail)
+    return Vector((0.0, 0.0, 1.0)) if forward else Vector((1.0, 0.0, 0.0))
+
+
+def _as_table(skeleton: Skeleton, units: float) -> dict:
+    return {
+        "names": skeleton.names,
+        "parents": skeleton.parents,
+        "offsets": skeleton.offsets.tolist(),
+        "end_parents": skeleton.end_parents,
+        "end_offsets": skeleton.end_offsets.tolist(),
+        "units_per_metre": units,
+    }
+
+
+def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
+    """The skeleton stored by `create`, as large as the object is now; None where there is none or it is damaged."""
+    try:
+        table = json.loads(body.data[PROPERTY])
+        grown = placement(body, scene).scale * table.pop("units_per_metre")
+        skeleton = Skeleton(**table)
+    except (KeyError, TypeError, ValueError, InputError):
+        return None
+    if abs(grown - 1.0) < 1e-6:
+        return skeleton
+    return replace(skeleton, offsets=skeleton.offsets * grown, end_offsets=skeleton.end_offsets * grown)
+
+
+def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
+    roots = [bone for bone in body.data.bones if bone.parent is None]
+    root = max(roots, key=lambda bone: len(bone.children_recursive))
+    bones = [root]
+    for bone in bones:  # grows while it is walked: breadth first, so parents stand before children
+        bones.extend(bone.children)
+    names = [bone.name for bone in bones]
+    parents = [-1] + [names.index(bone.parent.name) for bone in bones[1:]]
+    scale = placement(body, scene).scale
+    heads = np.array([bone.head_local for bone in bones]) * scale
+    tails = np.array([bone.tail_local for bone in bones]) * scale
+    tips = [i for i, bone in enumerate(bones) if not bone.children]
+    offsets = heads - heads[np.maximum(parents, 0)]
+    return Skeleton(tuple(names), tuple(parents), offsets, tuple(tips), (tails - heads)[tips])

@@ -1,0 +1,231 @@
+"""Which bone of a rig moves which part of the body: found by names and structure, kept by skeleton, as JSON files.
+
+A map is a dict part -> bone name, the parts as PARTS has them. Control rigs (Rigify's and others that name their bones
+"..._fk") are driven by their controls; rigs without controls by their own bones.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.digest import hex_digest
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.files.whole import atomic_write
+from ...beyond_mocap.motion.humanoid import Humanoid, identify, roles_of, side_and_part
+from ...beyond_mocap.motion.skeleton import Skeleton
+
+SPINES, NECKS = 6, 3
+_LIMB = {
+    "shoulder": "Shoulder", "upper_arm": "Arm", "lower_arm": "ForeArm", "hand": "Hand",
+    "upper_leg": "UpLeg", "lower_leg": "Leg", "foot": "Foot", "toe": "ToeBase",
+}
+JOINTS = {
+    "hips": "Hips",
+    **{f"spine {i}": f"Spine{i}" for i in range(1, SPINES + 1)},
+    "neck": "Neck", **{f"neck {i}": f"NeckTop{i}" for i in range(2, NECKS + 1)}, "head": "Head",
+    **{f"{side} {part}": side.capitalize() + name for side in ("left", "right") for part, name in _LIMB.items()},
+}
+"""Part -> the name of its joint, which the core knows the meaning of."""
+PARTS = ("root", *JOINTS)
+LEGS = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))
+NEEDED = ("hips", *LEGS)
+
+_FK = re.compile(r"(?i)(?<![a-z])fk(?![a-z])")
+_NO_CONTROL = re.compile(
+    r"(?i)^(mch|org|def|wgt|vis)[-_]|(?<![a-z])(ik|pole|tweak|target|twist|roll|corrective\w*|helper)(?![a-z])"
+)
+_NO_JOINT = re.compile(r"(?i)^(mch|wgt|vis)[-_]|(?<![a-z])(ik|pole|tweak|target|twist|corrective\w*|helper)(?![a-z])")
+_ARM = re.compile(r"arm|hand|wrist|elbow|shoulder|clavicle|finger")
+_ROOT = re.compile(r"(?i)^(.*:)?(root|master|root_?bone|ctrl_?root|c_pos)$")
+
+
+def suggest(rig: bpy.types.Object) -> dict[str, str]:
+    """The parts of an armature object and their bones; InputError where no legs can be found."""
+    skeleton, bones = _named_tree(rig)
+    try:
+        body = identify(skeleton)
+    except InputError as error:
+        found = str(error).partition(": ")[2].partition(";")[0]
+        raise InputError(f"armature {rig.name}", f"no legs: {found}", "a humanoid with two legs",
+                         "choose its bones in the bone map") from None
+    parts = _parts(skeleton, body)
+    armed = [bones[parts[leg]] for leg in LEGS if _ARM.search(side_and_part(skeleton.names[parts[leg]])[1])]
+    if armed:  # structure took arms for legs, since there are no others
+        raise InputError(f"armature {rig.name}", f"no legs (only {armed[0]} and such)", "a humanoid with two legs",
+                         "choose its bones in the bone map")
+    found = {part: bones[joint] for part, joint in parts.items()}
+    root = _root_above(rig, found["hips"])
+    return ({"root": root} if root else {}) | found
+
+
+def _parts(skeleton: Skeleton, body: Humanoid) -> dict[str, int]:
+    found = {role: joint for role, joint in roles_of(body).items()}
+    found |= {f"spine {i}": joint for i, joint in enumerate(_thinned(body.spine, SPINES), 1)}
+    if body.neck is not None and body.head is not None:
+        between, joint = [], skeleton.parents[body.head]
+        while joint >= 0 and joint != body.neck:
+            between.append(joint)
+            joint = skeleton.parents[joint]
+        if joint == body.neck:
+            found |= {f"neck {i}": joint for i, joint in enumerate(_thinned(between[::-1], NECKS - 1), 2)}
+    return {part: found[part] for part in JOINTS if part in found}
+
+
+def _thinned(joints, most: int) -> list[int]:
+    """At most so many of them, first and last kept."""
+    joints = list(joints)
+    if len(joints) <= most:
+        return joints
+    return [joints[i] for i in np.round(np.linspace(0, len(joints) - 1, most)).astype(int)]
+
+
+def _named_tree(rig: bpy.types.Object) -> tuple[Skeleton, list[str]]:
+    """The bones that may be parts as a skeleton under plain names, and their own names, one per joint."""
+    bones = list(rig.data.bones)
+    has_controls = sum(bool(_FK.search(bone.name)) for bone in bones) >= 6
+    barred = _NO_CONTROL if has_controls else _NO_JOINT
+    plain = {bone.name: _plain(bone, rig) for bone in bones if not barred.search(bone.name)}
+    if has_controls:
+        controlled = {name for bone, name in plain.items() if _FK.search(bone)}
+        plain = {bone: name for bone, name in plain.items() if _FK.search(bone) or name not in controlled}
+    above = {name: _nearest_above(rig.data.bones[name], plain) for name in plain}
+    roots = [name for name in plain if above[name] is None]
+    if not roots:
+        raise InputError(f"armature {rig.name}", "no bones", "a humanoid rig", "choose another armature")
+    below: dict[str, list[str]] = {name: [] for name in plain}
+    for name, parent in above.items():
+        if parent is not None:
+            below[parent].append(name)
+    order = [max(roots, key=lambda name: _count(below, name))]
+    for name in order:  # grows while it is walked
+        order.extend(below[name])
+    parents = [-1] + [order.index(above[name]) for name in order[1:]]
+    heads = np.array([rig.data.bones[name].head_local for name in order])
+    tails = np.array([rig.data.bones[name].tail_local for name in order])
+    tips = [i for i, name in enumerate(order) if not below[name]]
+    offsets = heads - heads[np.maximum(parents, 0)]
+    names = _unique([plain[name] for name in order])
+    return Skeleton(names, tuple(parents), offsets, tuple(tips), (tails - heads)[tips]), order
+
+
+def _plain(bone: bpy.types.Bone, rig: bpy.types.Object) -> str:
+    """A bone's name as the core reads names; Rigify's hips are its torso, which carries its control named hips."""
+    if "torso" in rig.data.bones:
+        if bone.name == "torso":
+            return "hips"
+        if bone.name in ("hips", "chest"):
+            return f"{bone.name} control"
+    return re.sub(r"[_\-. ]{2,}", "_", _FK.sub("", bone.name)).strip("_-. ")
+
+
+def _nearest_above(bone: bpy.types.Bone, among) -> str | None:
+    while (bone := bone.parent) is not None:
+        if bone.name in among:
+            return bone.name
+    return None
+
+
+def _count(below: dict[str, list[str]], name: str) -> int:
+    return 1 + sum(_count(below, child) for child in below[name])
+
+
+def _unique(names: list[str]) -> tuple[str, ...]:
+    taken: dict[str, int] = {}
+    out = []
+    for name in names:
+        taken[name] = taken.get(name, 0) + 1
+        out.append(name if taken[name] == 1 else f"{name} again {taken[name]}")
+    return tuple(out)
+
+
+def _root_above(rig: bpy.types.Object, hips: str) -> str | None:
+    """The bone that carries the whole rig; None where the hips do so themselves."""
+    named = [bone.name for bone in rig.data.bones if bone.parent is None and _ROOT.match(bone.name)]
+    if named and named[0] != hips:
+        return named[0]
+    above = rig.data.bones[hips].parent_recursive
+    return above[-1].name if above and not _NO_CONTROL.search(above[-1].name) else None
+
+
+def check(rig: bpy.types.Object, table: dict[str, str]) -> None:
+    """InputError where a map cannot be used on this armature."""
+    where = f"bone map of {rig.name}"
+    missing = [part for part in NEEDED if part not in table]
+    if missing:
+        raise InputError(where, f"no bone for {', '.join(missing)}", "hips and two legs",
+                         "choose them in the list, or press Map Bones")
+    lost = [bone for bone in table.values() if bone not in rig.data.bones]
+    if lost:
+        raise InputError(where, f"no bone {', '.join(lost[:3])}", "bones of this armature", "choose them in the list")
+    seen: dict[str, str] = {}
+    for part, bone in table.items():
+        if bone in seen:
+            raise InputError(where, f"bone {bone} is both {seen[bone]} and {part}", "one part for each bone",
+                             "clear one of them in the list")
+        seen[bone] = part
+
+
+def fingerprint(rig: bpy.types.Object) -> str:
+    """A short hash of all bones' names and parents: the same for every copy of a skeleton."""
+    lines = sorted(f"{bone.name}<{bone.parent.name if bone.parent else ''}" for bone in rig.data.bones)
+    return hex_digest("\n".join(lines))
+
+
+def kept_folder(create: bool = False) -> Path | None:
+    """Where maps are kept by skeleton, in the user's folder of this extension; None where Blender offers none."""
+    package = __package__.rpartition(".")[0]
+    try:
+        return Path(bpy.utils.extension_path_user(package, path="bone_maps", create=create))
+    except (ValueError, OSError):  # run beside Blender, not as an extension
+        return None
+
+
+def keep(rig: bpy.types.Object, table: dict[str, str]) -> Path | None:
+    """Keep a map for all armatures with these bones; returns the file, None where there is no place for it."""
+    folder = kept_folder(create=True)
+    if folder is None:
+        return None
+    path = folder / f"{fingerprint(rig)}.json"
+    save(path, rig, table)
+    return path
+
+
+def kept(rig: bpy.types.Object) -> dict[str, str] | None:
+    """The map that was kept for these bones; None where there is none, or none that can be read."""
+    folder = kept_folder()
+    path = folder / f"{fingerprint(rig)}.json" if folder else None
+    if path is None or not path.is_file():
+        return None
+    try:
+        return load(path)
+    except InputError:
+        return None
+
+
+def save(path: Path, rig: bpy.types.Object, table: dict[str, str]) -> None:
+    """Write a map as a JSON file, whole or not at all; InputError where that cannot be done."""
+    text = json.dumps({"skeleton": fingerprint(rig), "rig": rig.name, "bones": table}, indent=1, ensure_ascii=False)
+    atomic_write(path, text + "\n")
+
+
+def load(path: Path) -> dict[str, str]:
+    """A map from a JSON file; InputError where it is missing or is none."""
+    form = '{"bones": {"hips": "bone name", ...}}'
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (.json)", "check the path") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"not JSON ({error})", form, "mend the file") from None
+    table = found.get("bones") if isinstance(found, dict) else None
+    if not isinstance(table, dict) or not all(isinstance(bone, str) for bone in table.values()):
+        raise InputError(path, "no object of bone names", form, "mend the file")
+    strange = [part for part in table if part not in PARTS]
+    if strange:
+        raise InputError(path, f"no part {strange[0]!r}", f"one of {', '.join(PARTS)}", "mend the name")
+    return {part: table[part] for part in PARTS if table.get(part)}

@@ -1,0 +1,87 @@
+"""A take, or a whole match, as a file of Blender's or of its exporters (.blend, .fbx, .glb, .usdc), for the command
+line.
+
+It is put into an empty file of its own, at its own rate: a take with its armature, body and ball, a match as it is
+shown in the scene; nothing that is open is asked for, since a command has nothing open that it could lose.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import bpy
+
+from ...beyond_mocap.synthesis.take import Take
+from ..core import action
+from . import armature, export
+from ..result import bake
+from ..stage import ball, body
+from ..match import load, show
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.match.make import MatchResult
+
+NAME = "Player"
+SHIRT = (0.75, 0.05, 0.06)
+
+
+def write(made: "Take | MatchResult", out: Path) -> tuple[str, ...]:
+    """Write a take or a match to `out` in the form that its suffix names; beside it first, then renamed. Returns lines
+    about whoever of a match could not be shown."""
+    from ...beyond_mocap.match.make import MatchResult  # brings scipy, which is slow to import
+
+    lines = stage_match(made) if isinstance(made, MatchResult) else stage(made)
+    export.saved(out, EXPORTERS[out.suffix.lower()])
+    return lines
+
+
+def stage(take: Take) -> tuple[str, ...]:
+    """An empty file with the take in it, first frame 0."""
+    scene = _empty(take.motion.fps)
+    scene.frame_start, scene.frame_end = 0, len(take.motion) - 1
+    room = bake.collection(scene)
+    player = armature.create(bpy.context, take.motion.skeleton, NAME, room)
+    body.create(player, NAME, SHIRT, room, scene, take.motion)
+    action.write(player, take.motion, scene, 0.0, f"{NAME} take")
+    if take.ball is not None:
+        first = (float(take.ball.times[0]) - take.start_time) * take.motion.fps
+        ball.write(ball.create(bpy.context, bake.BALL, room), take.ball, scene, first)
+    return ()
+
+
+def stage_match(made: "MatchResult") -> tuple[str, ...]:
+    """An empty file with all of a made match in it, first frame 0."""
+    from ...beyond_mocap.match.folder import read_state
+
+    order, state = made.order, read_state(made.order.out)
+    scene = _empty(order.fps)
+    colours = {team["ground"]: team["colour"] for team in state["teams"]}
+    build = {"cache_dir": order.cache, "skeleton": order.skeleton, "seed": order.seed}
+    wanted = load.Wanted(str(order.out), *made.span, (), colours, str(order.library), order.unit, build)
+    _, scenery, lines = load.scenery(wanted, None, lambda fraction, text: None, lambda: False)
+    scene.frame_start = scene.frame_end = 0
+    show.show(bpy.context, scenery, 0)
+    return lines
+
+
+def _empty(rate: float) -> bpy.types.Scene:
+    """The scene of an empty file at so many frames per second."""
+    bpy.ops.wm.read_homefile(use_empty=True)
+    scene = bpy.context.scene
+    scene.render.fps = max(1, round(rate))
+    scene.render.fps_base = scene.render.fps / rate
+    return scene
+
+
+def _blend(path: str) -> None:
+    bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, check_existing=False)
+
+
+def _by(format: str):
+    """The exporter of a format for all that is in the file, axes as Blender's exporters have them."""
+    return lambda path: export.EXPORTERS[format](path, "BLENDER", False)
+
+
+EXPORTERS = {".blend": _blend, ".fbx": _by("FBX"), ".glb": _by("GLB"), ".usdc": _by("USD")}
+WRITERS = dict.fromkeys(EXPORTERS, write)

@@ -1,0 +1,466 @@
+"""Motions as files of Blender's own exporters: what the rig shows becomes one action on a plain copy, and that is
+written.
+
+The copy stands in a scene of its own and is taken away afterwards; the user's scene stays as it is. On the copy there
+are no constraints, drivers or NLA strips left that an exporter could read otherwise than Blender shows them.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.vectors import nearest_axis
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.files.whole import beside
+from ...beyond_mocap.motion import quaternion
+from . import bone_maps
+from ..core import channels
+from ..core.aside import scene_aside
+from ..core.measure import frames_per_second, units_per_metre
+
+SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
+_OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
+_FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
+_USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
+ROOT_BONE = "root"
+_EVEN = 1e-4  # scale that is none
+HIDDEN = {"hide_viewport", "hide_render"}
+"""What is keyed on a mesh that is there for a part of the time only."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What to write. rate: frames per second, None for the scene's. root: one of `rig.ROOTS`."""
+
+    path: Path
+    format: str = "FBX"
+    engine: str = "BLENDER"
+    rate: float | None = None
+    root: str = "KEEP"
+    deform_only: bool = True
+    meshes: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What Blender shows of an armature: bones' poses (F, B, 4, 4) in its space, the object's (F, 4, 4) in the
+    world."""
+
+    bones: list[str]
+    poses: np.ndarray
+    lies: np.ndarray
+
+
+def write(
+    context: bpy.types.Context, rigs: list[bpy.types.Object], wanted: Wanted, things: list[bpy.types.Object] = ()
+) -> list[str]:
+    """Write the rigs' motions; returns lines for the user. InputError where they or the file are no good.
+
+    things: meshes that no rig moves, such as a ball and a pitch, which are written beside them (not as BVH).
+    """
+    check(wanted.format)
+    if not rigs:
+        raise InputError("export", "no armature", "an armature that moves", "select one, or choose players")
+    if not wanted.path.parent.is_dir() or not os.access(wanted.path.parent, os.W_OK):
+        raise InputError(wanted.path, "the folder cannot be written", "a folder that exists and is yours",
+                         "choose another place")
+    scene = context.scene
+    first, last = extent(rigs)
+    rate = wanted.rate or frames_per_second(scene)
+    times = first + np.arange(int(np.floor((last - first) * rate / frames_per_second(scene) + 1e-6)) + 1) * (
+        frames_per_second(scene) / rate)
+    things = [] if wanted.format == "BVH" else list(things)
+    shown = _look(scene, rigs, times, things)
+    worn = {rig.name: _dress(scene, rig) for rig in rigs} if wanted.meshes and wanted.format != "BVH" else {}
+    told = []
+    with _stage(context, rate, len(times)) as stage:
+        copies = [_copy(stage, rig, shown[rig.name], wanted, told) for rig in rigs]
+        meshes = [_worn(stage, thing, rig, copy) for rig, copy in zip(rigs, copies) for thing in worn.get(rig.name, ())]
+        free = [_free(stage, thing, shown[thing.name].lies) for thing in things]
+        if wanted.format == "GLB" and not meshes:
+            told.append("no mesh hangs on the armature: glTF knows its bones as plain nodes then")
+        dressed = [thing for rig in rigs for thing in worn.get(rig.name, ())]
+        with _names([*rigs, *dressed, *things], [*copies, *meshes, *free]):
+            _save(stage, copies, wanted)
+    told.insert(0, f"{len(times)} frames at {rate:g} per second, {len(rigs)} armature{'s' * (len(rigs) > 1)}, "
+                   f"{len(meshes)} mesh{'es' * (len(meshes) != 1)}"
+                   + (f", {len(things)} object{'s' * (len(things) > 1)} beside them" if things else ""))
+    return told
+
+
+def check(format: str) -> None:
+    """InputError where this Blender lacks the exporter."""
+    if format not in _OPERATORS:
+        return
+    group, name = _OPERATORS[format]
+    try:
+        getattr(getattr(bpy.ops, group), name).get_rna_type()
+    except (AttributeError, KeyError):
+        others = ", ".join(f for f in SUFFIXES if f != format)
+        raise InputError("export", f"this Blender has no {format} exporter", f"one that it has ({others})",
+                         "choose another format, or switch the exporter's add-on on") from None
+
+
+def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
+    """First and last scene frame of what the armatures play; InputError where one plays nothing."""
+    ends = []
+    for rig in rigs:
+        data = rig.animation_data
+        own = []
+        playing, slot = channels.playing(rig)
+        if playing is not None:
+            found = channels.keyed_range(channels.curves(playing, slot))
+            own += [found] if found else []
+        own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
+                if not t.mute for s in t.strips if not s.mute]
+        if not own:
+            raise InputError(f"armature {rig.name}", "it does not move", "an action or NLA strips",
+                             "bake or accept a motion first")
+        ends += own
+    return min(a for a, _ in ends), max(b for _, b in ends)
+
+
+def _look(
+    scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
+) -> dict[str, _Shown]:
+    """What Blender shows of the armatures, and of things without bones, at scene frames (F,), whole or not; the frame
+    comes back."""
+    now, subframe = scene.frame_current, scene.frame_subframe
+    names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
+    poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
+    lies = {one.name: np.empty((len(times), 4, 4)) for one in (*rigs, *things)}
+    for number, time in enumerate(times):
+        whole = int(np.floor(time + 1e-6))
+        scene.frame_set(whole, subframe=float(np.clip(time - whole, 0.0, 0.999999)))
+        for rig in rigs:
+            poses[rig.name][number] = [bone.matrix for bone in rig.pose.bones]
+        for one in (*rigs, *things):
+            lies[one.name][number] = one.matrix_world
+    scene.frame_set(now, subframe=subframe)
+    ordered = {rig.name: [bone.name for bone in rig.pose.bones] for rig in rigs}
+    none = np.empty((len(times), 0, 4, 4), np.float32)
+    return {name: _Shown(ordered.get(name, []), poses.get(name, none).astype(float), lies[name]) for name in lies}
+
+
+@contextmanager
+def _stage(context: bpy.types.Context, rate: float, frames: int):
+    """A scene of its own at this rate; afterwards selection and mode are the user's again."""
+    units, chosen = context.scene.unit_settings, list(context.selected_objects)
+    active = context.view_layer.objects.active
+    mode = active.mode if active is not None else "OBJECT"
+    try:
+        with scene_aside("Beyond Mocap export") as stage:
+            stage.unit_settings.system, stage.unit_settings.scale_length = units.system, units.scale_length
+            stage.render.fps = max(1, round(rate))
+            stage.render.fps_base = stage.render.fps / rate
+            stage.frame_start, stage.frame_end = 0, max(frames - 1, 0)
+            yield stage
+    finally:
+        for one in context.view_layer.objects:
+            if one.select_get() != (one in chosen):
+                one.select_set(one in chosen)
+        context.view_layer.objects.active = active
+        if active is not None and active.mode != mode:
+            bpy.ops.object.mode_set(mode=mode)
+
+
+def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
+    """A plain armature that plays what the rig shows."""
+    data = rig.data.copy()
+    copy = bpy.data.objects.new(rig.name, data)
+    stage.collection.objects.link(copy)
+    data.pose_position = "POSE"
+    hips, root, line, in_place = _root_motion(rig, shown, wanted, told)
+    kept = _kept(rig, wanted, root)
+    poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in kept}
+    if in_place is not None:
+        poses = {name: in_place @ pose for name, pose in poses.items()}
+    if line is not None:
+        poses[root or ROOT_BONE] = line
+    parents = _plain(stage, copy, rig, kept, hips if line is not None and root is None else None, told)
+    _play(copy, poses, parents, shown.lies, wanted)
+    return copy
+
+
+def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
+    """The bones that go into the file."""
+    every = {bone.name for bone in rig.data.bones}
+    deform = {bone.name for bone in rig.data.bones if bone.use_deform}
+    if not wanted.deform_only or len(deform) < 8:
+        return every
+    named = root or next((b.name for b in rig.data.bones if b.parent is None and b.name.lower() == ROOT_BONE), None)
+    return deform | ({named} if named else set())
+
+
+def _root_motion(rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
+    """Hips, root bone (None: it has none), the root's way (F, 4, 4) and what brings everything back to where it began
+    (F, 4, 4); both None where they are not asked for."""
+    if wanted.root == "KEEP":
+        return None, None, None, None
+    from ...beyond_mocap.motion.path.root_path import ground_path
+
+    table = bone_maps.kept(rig) or bone_maps.suggest(rig)
+    at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
+    world = shown.lies[:, None] @ shown.poses[:, list(at.values())]
+    legs = world[:, :, :3, 3]
+    across = legs[:, 0] - legs[:, 1]
+    facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
+    units = units_per_metre(bpy.context.scene)
+    place, yaw = ground_path(legs.mean(axis=1)[:, :2] / units, facing, frames_per_second(bpy.context.scene) if
+                             wanted.rate is None else wanted.rate,
+                             "straight" if wanted.root == "STRAIGHT" else "smooth")
+    way = np.tile(np.eye(4), (len(yaw), 1, 1))
+    way[:, :3, :3] = quaternion.to_matrix(quaternion.about_up(yaw))
+    way[:, :2, 3] = place * units
+    inward = np.linalg.inv(shown.lies)
+    own = table.get("root")
+    if wanted.root == "IN_PLACE":
+        return table["hips"], own, None, inward @ way[:1] @ np.linalg.inv(way) @ shown.lies
+    if own is not None:
+        rest = np.array(rig.data.bones[own].matrix_local)
+        upright = _standing(rig, table)
+        return table["hips"], own, inward @ way @ upright @ rest, None
+    told.append(f"{rig.name} has no root bone: one named {ROOT_BONE!r} was added to the copy in the file")
+    return table["hips"], None, inward @ way @ _standing(rig, table), None
+
+
+def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
+    """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
+    heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
+    lie = np.array(rig.matrix_world.to_3x3())
+    hips = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"])
+    up = nearest_axis(hips - 0.5 * (heads["left foot"] + heads["right foot"]))
+    across = heads["left upper_leg"] - heads["right upper_leg"]
+    left = nearest_axis(across - (across @ up) * up)
+    size = np.cbrt(abs(np.linalg.det(lie)))
+    turn = np.stack([np.cross(left, up), left, up]) * size
+    out = np.eye(4)
+    out[:3, :3] = turn
+    out[:3, 3] = -turn @ (hips - (hips @ up) * up)
+    return out
+
+
+def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
+    """Only the kept bones stay in the copy, each below the nearest kept one, turned and scaled with it in the plain
+    way; with `hips` a root bone is added above all. Returns bone -> parent."""
+    parents = {name: _above(rig, name, kept) for name in kept}
+    layer = stage.view_layers[0]
+    layer.update()
+    layer.objects.active = copy
+    with bpy.context.temp_override(scene=stage, view_layer=layer, active_object=copy, object=copy,
+                                   selected_objects=[copy]):
+        bpy.ops.object.mode_set(mode="EDIT")
+        bones = copy.data.edit_bones
+        for bone in bones:
+            bone.use_connect = False
+        for name, parent in parents.items():
+            bones[name].parent = bones[parent] if parent else None
+        for bone in list(bones):
+            if bone.name not in kept:
+                bones.remove(bone)
+            else:
+                bone.use_inherit_rotation, bone.use_local_location, bone.inherit_scale = True, True, "FULL"
+        if hips is not None:
+            root = bones.new(ROOT_BONE)
+            root.head, root.tail = (0, 0, 0), (0, bones[hips].length or 1.0, 0)
+            for name, parent in parents.items():
+                if parent is None:
+                    bones[name].parent, parents[name] = root, ROOT_BONE
+            parents[ROOT_BONE] = None
+        bpy.ops.object.mode_set(mode="OBJECT")
+    return parents
+
+
+def _above(rig: bpy.types.Object, name: str, kept: set[str]) -> str | None:
+    """The nearest kept bone above; Rigify's deform bones hang on bones "ORG-x", which stand for "DEF-x"."""
+    bone = rig.data.bones[name].parent
+    while bone is not None:
+        for other in (bone.name, f"DEF-{bone.name[4:]}" if bone.name.startswith("ORG-") else ""):
+            if other in kept and other != name:
+                return other
+        bone = bone.parent
+    return None
+
+
+def _play(copy, poses: dict[str, np.ndarray], parents: dict[str, str | None], lies: np.ndarray, wanted: Wanted) -> None:
+    """One action of the copy: its bones as `poses` (F, 4, 4) in its space, the object as `lies` (F, 4, 4)."""
+    rest = {name: np.array(copy.data.bones[name].matrix_local) for name in parents}
+    curves: dict[str, tuple[str, np.ndarray]] = {}
+    for name, parent in parents.items():
+        pose = poses[name]
+        local = np.linalg.inv(rest[name]) @ pose if parent is None else (
+            np.linalg.inv(rest[name]) @ rest[parent] @ np.linalg.inv(poses[parent]) @ pose)
+        path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
+        copy.pose.bones[name].rotation_mode = "QUATERNION"
+        curves |= {f"{path}.{channel}": (name, values) for channel, values in _channels(local).items()}
+    channels.animate(copy, copy.name, np.arange(len(lies)), curves | _lying(copy, lies))
+
+
+def _lying(copy: bpy.types.Object, lies: np.ndarray) -> dict[str, tuple[str, np.ndarray]]:
+    """Lays an object where it lies (F, 4, 4) at first; curves of its way, none where it stays there."""
+    copy.rotation_mode = "QUATERNION"
+    moves = _channels(lies)
+    for channel, values in moves.items():
+        setattr(copy, channel, values[0])
+    if "scale" not in moves:
+        copy.scale = (1, 1, 1)
+    if np.ptp(lies, axis=0).max() <= 1e-6:
+        return {}
+    return {channel: ("Object", values) for channel, values in moves.items()}
+
+
+def _free(stage: bpy.types.Scene, thing: bpy.types.Object, lies: np.ndarray) -> bpy.types.Object:
+    """A copy of a mesh that hangs on nothing and lies (F, 4, 4) in the world as the thing does."""
+    copy = thing.copy()
+    copy.animation_data_clear()
+    stage.collection.objects.link(copy)
+    copy.parent = None
+    copy.matrix_parent_inverse.identity()
+    copy.delta_location, copy.delta_scale = (0, 0, 0), (1, 1, 1)
+    copy.constraints.clear()
+    copy.hide_viewport = copy.hide_render = copy.hide_select = False
+    curves = _lying(copy, lies)
+    if curves:
+        channels.animate(copy, copy.name, np.arange(len(lies)), curves)
+    return copy
+
+
+def _channels(matrices: np.ndarray) -> dict[str, np.ndarray]:
+    """Location, rotation and, where it is not 1, scale of matrices (F, 4, 4)."""
+    size = np.linalg.norm(matrices[:, :3, :3], axis=1)
+    turn = matrices[:, :3, :3] / np.maximum(size, 1e-12)[:, None, :]
+    found = {"location": matrices[:, :3, 3], "rotation_quaternion": quaternion.continuous(quaternion.from_matrix(turn))}
+    return found | ({"scale": size} if np.abs(size - 1.0).max() > _EVEN else {})
+
+
+def _dress(scene: bpy.types.Scene, rig: bpy.types.Object) -> list[bpy.types.Object]:
+    """The meshes that an armature moves, visible now or at some other time by their keys."""
+    moved = [thing for thing in scene.objects if thing.type == "MESH" and (
+        thing.parent == rig or any(m.type == "ARMATURE" and m.object == rig for m in thing.modifiers))]
+    return [thing for thing in moved if thing.visible_get() or _keyed(thing, HIDDEN)]
+
+
+def _keyed(thing: bpy.types.Object, paths: set[str]) -> bool:
+    """Whether an object has keys on all of these properties and on no other."""
+    playing, slot = channels.playing(thing)
+    return playing is not None and {path for path, _ in channels.curves(playing, slot)} == paths
+
+
+def _worn(stage: bpy.types.Scene, thing: bpy.types.Object, rig: bpy.types.Object, copy: bpy.types.Object):
+    """A copy of a mesh, moved by the rig's copy."""
+    place = thing.matrix_world.copy()
+    twin = thing.copy()
+    stage.collection.objects.link(twin)
+    if thing.parent == rig and (thing.parent_type != "BONE" or thing.parent_bone in copy.data.bones):
+        inverse = thing.matrix_parent_inverse.copy()
+        twin.parent, twin.matrix_parent_inverse = copy, inverse
+    else:
+        twin.parent, twin.matrix_world = None, place
+    for modifier in twin.modifiers:
+        if modifier.type == "ARMATURE" and modifier.object == rig:
+            modifier.object = copy
+    if _keyed(thing, HIDDEN):  # the formats have no word for it
+        twin.animation_data_clear()
+        twin.hide_viewport = twin.hide_render = False
+    return twin
+
+
+@contextmanager
+def _names(rigs, copies):
+    """The copies have the rigs' own names, and their bones' data too, as long as they are written."""
+    local = [(rig, copy, rig.name) for rig, copy in zip(rigs, copies) if rig.library is None]
+    for rig, copy, name in local:
+        rig.name = f"{name} (original)"
+        copy.name = name
+        if copy.type == "ARMATURE" and name not in bpy.data.armatures:  # USD's bones; many may share one
+            copy.data.name = name
+        if copy.animation_data and copy.animation_data.action:
+            copy.animation_data.action.name = f"{name} motion"
+    try:
+        yield
+    finally:
+        for rig, copy, name in local:
+            copy.name = f"{name} (copy)"
+            rig.name = name
+
+
+def _save(stage, copies, wanted: Wanted) -> None:
+    """Written beside, then renamed: no half-written file is left."""
+    layer = stage.view_layers[0]
+    layer.update()
+    for thing in layer.objects:
+        thing.select_set(True)
+    layer.objects.active = copies[0]
+    if wanted.format == "BVH":
+        _write_bvh(stage, copies, wanted.path)
+        return
+    saved(wanted.path, lambda path: EXPORTERS[wanted.format](path, wanted.engine, True))
+
+
+def with_ending(path: Path, ending: str) -> Path:
+    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its
+    ".v2")."""
+    if path.suffix.lower() in {ending, *SUFFIXES.values()}:
+        return path.with_suffix(ending)
+    return path.with_name(path.name + ending)
+
+
+def saved(out: Path, write_to) -> None:
+    """Let `write_to(path)` write beside `out`, then rename; InputError for what exporters raise."""
+    try:
+        with beside(out, out.suffix) as part:
+            write_to(str(part))
+            if not part.is_file():
+                raise RuntimeError("nothing was written")
+    except (RuntimeError, AttributeError) as error:  # what operators raise: trouble while writing; a disabled exporter
+        found, expected = f"this Blender could not write it ({error})", "an exporter that it has, and a place to write"
+        raise InputError(out, found, expected, "choose another ending or place") from None
+
+
+def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
+    from ...beyond_mocap.files.bvh import bvh
+    from .source import evaluated
+
+    frames = np.arange(stage.frame_end + 1)
+    for copy in copies:
+        own = path if len(copies) == 1 else path.with_name(f"{path.stem} {copy.name}{path.suffix}")
+        bvh.write(own, evaluated(copy, stage, frames))
+
+
+def _fbx(path: str, engine: str, selected: bool) -> None:
+    forward, up = _FBX_AXES[engine]
+    bpy.ops.export_scene.fbx(
+        filepath=path, check_existing=False, use_selection=selected, object_types={"ARMATURE", "MESH", "EMPTY"},
+        axis_forward=forward, axis_up=up, apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY"
+        else "FBX_SCALE_NONE",
+        add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True, bake_anim_use_nla_strips=False,
+        bake_anim_use_all_actions=False, bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0,
+    )
+
+
+def _glb(path: str, _engine: str, selected: bool) -> None:
+    bpy.ops.export_scene.gltf(
+        filepath=path, check_existing=False, export_format="GLB", use_selection=selected, use_active_scene=True,
+        export_yup=True, export_animations=True, export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
+        export_force_sampling=True, export_optimize_animation_size=False,
+    )
+
+
+def _usd(path: str, engine: str, selected: bool) -> None:
+    turned = {}
+    if engine in _USD_AXES:
+        forward, up = _USD_AXES[engine]
+        turned = {"convert_orientation": True, "export_global_forward_selection": forward,
+                  "export_global_up_selection": up}
+    bpy.ops.wm.usd_export(filepath=path, check_existing=False, selected_objects_only=selected, export_animation=True,
+                          export_armatures=True, **turned)
+
+
+EXPORTERS = {"FBX": _fbx, "GLB": _glb, "USD": _usd}
+"""Format -> function (path, engine, only what is selected) that writes the scene in the window."""

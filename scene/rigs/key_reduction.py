@@ -1,0 +1,190 @@
+"""Fewer keys: those that a curve does not need are left out, and what stays is within a tolerance on every frame.
+
+All channels of a bone's rotation keep keys on the same frames. Between two keys the curve is the cubic with the slopes
+that the dense motion has there, which is what Blender draws with handles a third of the way; where it is off by more
+than the tolerance, the worst frame gets a key too (Douglas and Peucker 1973, with cubics). Quaternions are measured as
+the rotations that they are, so their length does no harm. A bone may turn by what moves the ends that it carries by the
+tolerance; as such turns add up along a limb, this share is lowered until hands, feet and head are where they may be.
+"""
+
+from __future__ import annotations
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.vectors import unit_vectors
+from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
+from ..core import channels
+from . import bake_record
+from .driven import Driven
+
+BEZIER, ALIGNED = 2, "ALIGNED"
+_ROUNDS, _TIGHTER = 14, 0.6
+_ENDS = ("head", "left hand", "right hand", "left foot", "right foot", "left toe", "right toe")
+
+
+def reduce(
+    rig: bpy.types.Object, table: dict[str, str], scene: bpy.types.Scene, tolerance: float, turn_tolerance: float
+) -> tuple[int, int]:
+    """Leave out keys of the action that the rig plays, driven by the bones of `table`; returns keys before and after.
+
+    tolerance: metres that hands, feet, head and moved bones may be off. turn_tolerance: radians that a bone may be.
+    """
+    playing, slot = channels.playing(rig)
+    if playing is None:
+        raise InputError(f"rig {rig.name}", "it plays no action", "a baked rig", "Bake to Rig first")
+    channels.check_free(rig)
+    curves = channels.curves(playing, slot)
+    ends = channels.keyed_range(curves)
+    driven = Driven(rig, table, scene)
+    frames = np.arange(ends[0], ends[1] + 1)
+    dense = _dense(rig, curves, frames)
+    reach = _extremities(driven, dense)
+    places, levers, share = reach({}), _levers(driven), 1.0
+    for _ in range(_ROUNDS):
+        kept = {}
+        for path, values in dense.items():
+            lever = levers.get(path.rpartition(".")[0], 0.0)
+            most = min(turn_tolerance, share * tolerance / max(lever, 1e-3)) if _is_turn(path) else (
+                share * tolerance / driven.placement.scale)
+            kept[path] = kept_frames(values, most, _metric(rig, path))
+        found = {path: between_keys(dense[path], kept[path]) for path in dense}
+        if np.abs(np.linalg.norm(reach(found) - places, axis=-1)).max(initial=0.0) <= tolerance:
+            break
+        share *= _TIGHTER
+    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), bake_record.is_as_baked(rig)
+    for path, values in dense.items():
+        for index in range(values.shape[1]):
+            _rekey(curves[path, index], frames, values[:, index], kept[path])
+    if as_baked:
+        bake_record.note(rig)
+    return before, sum(len(curve.keyframe_points) for curve in curves.values())
+
+
+def kept_frames(values: np.ndarray, tolerance: float, metric) -> np.ndarray:
+    """Indices, rising, of the frames of values (F, n) that need a key. metric: (values, values) -> (F,) distances."""
+    slopes = np.gradient(values, axis=0) if len(values) > 1 else np.zeros_like(values)
+    kept, open_spans = {0, len(values) - 1}, [(0, len(values) - 1)]
+    while open_spans:
+        low, high = open_spans.pop()
+        if high - low < 2:
+            continue
+        inside = np.arange(low + 1, high)
+        off = metric(_cubic(values, slopes, low, high, inside), values[inside])
+        worst = int(np.argmax(off))
+        if off[worst] > tolerance:
+            middle = int(inside[worst])
+            kept.add(middle)
+            open_spans += [(low, middle), (middle, high)]
+    return np.array(sorted(kept))
+
+
+def between_keys(values: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """The curve (F, n) that keys on the frames `kept` of values (F, n) make."""
+    slopes = np.gradient(values, axis=0) if len(values) > 1 else np.zeros_like(values)
+    out = values.copy()
+    for low, high in zip(kept[:-1], kept[1:]):
+        inside = np.arange(low + 1, high)
+        out[inside] = _cubic(values, slopes, low, high, inside)
+    return out
+
+
+def _cubic(values: np.ndarray, slopes: np.ndarray, low: int, high: int, at: np.ndarray) -> np.ndarray:
+    """Hermite's cubic from frame `low` to frame `high`, at frames (N,): (N, n)."""
+    width = float(high - low)
+    u = ((at - low) / width)[:, None]
+    a, b, c, d = 2 * u**3 - 3 * u**2 + 1, u**3 - 2 * u**2 + u, -2 * u**3 + 3 * u**2, u**3 - u**2
+    return a * values[low] + b * width * slopes[low] + c * values[high] + d * width * slopes[high]
+
+
+def _is_turn(path: str) -> bool:
+    return ".rotation_" in path
+
+
+def _dense(rig: bpy.types.Object, curves: dict, frames: np.ndarray) -> dict[str, np.ndarray]:
+    """Values (F, n) of every whole channel of a bone: rotations and locations that are keyed in all components."""
+    found: dict[str, np.ndarray] = {}
+    for path in dict.fromkeys(path for path, _ in curves):
+        count = 4 if path.endswith(("quaternion", "axis_angle")) else 3
+        whole = path.startswith("pose.bones") and path.endswith(
+            (".location", ".rotation_quaternion", ".rotation_euler", ".rotation_axis_angle"))
+        if whole and all((path, i) in curves for i in range(count)):
+            found[path] = np.stack([channels.sample(curves[path, i], frames) for i in range(count)], axis=1)
+    return found
+
+
+def _metric(rig: bpy.types.Object, path: str):
+    """How far two stretches of a channel's values are apart: radians of turns, units of places."""
+    if not _is_turn(path):
+        return lambda a, b: np.linalg.norm(a - b, axis=1)
+    mode = rig.path_resolve(path.rpartition(".")[0]).rotation_mode
+    return lambda a, b: _angle(as_turns(a, mode), as_turns(b, mode))
+
+
+def as_turns(values: np.ndarray, mode: str) -> np.ndarray:
+    """Rotations (F, 4) that channel values mean in a rotation mode."""
+    if mode == "QUATERNION":
+        return quaternion.normalized(values)
+    if mode == "AXIS_ANGLE":
+        axis = unit_vectors(values[:, 1:])
+        return quaternion.about_axis(axis, values[:, 0])
+    order = mode[::-1]  # see `action`: Blender names the axes in the order in which they are applied
+    return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    apart = quaternion.multiply(quaternion.inverse(a), b)
+    return 2.0 * np.arctan2(np.linalg.norm(apart[:, 1:], axis=1), np.abs(apart[:, 0]))
+
+
+def _extremities(driven: Driven, dense: dict[str, np.ndarray]):
+    """Function from changed channels (path -> values) to where hands, feet and head are then: (F, E, 3) metres."""
+    controls, rig = driven.controls, driven.rig
+    ends = [controls.bones.index(driven.table[part]) for part in _ENDS if part in driven.table]
+    count = len(next(iter(dense.values())))
+
+    def reach(changed: dict[str, np.ndarray]) -> np.ndarray:
+        turns, locations = {}, {}
+        for name in controls.bones:
+            path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
+            mode = rig.pose.bones[name].rotation_mode
+            kind = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(mode, "euler")
+            values = changed.get(f"{path}.rotation_{kind}", dense.get(f"{path}.rotation_{kind}"))
+            turns[name] = quaternion.identity(count) if values is None else as_turns(values, mode)
+            locations[name] = changed.get(f"{path}.location", dense.get(f"{path}.location"))
+        return controls.forward(turns, locations)[:, ends] * driven.placement.scale
+
+    return reach
+
+
+def _levers(driven: Driven) -> dict[str, float]:
+    """Path of each driven bone -> metres at rest to the farthest of those that it carries."""
+    controls, scale = driven.controls, driven.placement.scale
+    found: dict[str, float] = {}
+    for i, bone in enumerate(controls.bones):
+        at = controls.rides[i].place_of
+        while at >= 0:
+            path = f'pose.bones["{bpy.utils.escape_identifier(controls.bones[at])}"]'
+            away = float(np.linalg.norm(controls.rest_place[i] - controls.rest_place[at])) * scale
+            found[path] = max(found.get(path, 0.0), away)
+            at = controls.rides[at].place_of
+    return found
+
+
+def _rekey(curve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, kept: np.ndarray) -> None:
+    """Only the keys `kept`, joined by cubics with the slopes of the dense values."""
+    slopes = np.gradient(values) if len(values) > 1 else np.zeros_like(values)
+    at, value, slope = frames[kept].astype(float), values[kept], slopes[kept]
+    after = np.diff(at, append=at[-1] + 1.0) / 3.0
+    before = np.diff(at, prepend=at[0] - 1.0) / 3.0
+    points = curve.keyframe_points
+    points.clear()
+    points.add(len(kept))
+    kind = bpy.types.Keyframe.bl_rna.properties["handle_left_type"].enum_items[ALIGNED].value
+    for side in ("handle_left_type", "handle_right_type"):
+        points.foreach_set(side, np.full(len(kept), kind, np.int32))
+    for name, x, y in (("co", at, value), ("handle_left", at - before, value - before * slope),
+                       ("handle_right", at + after, value + after * slope)):
+        points.foreach_set(name, np.column_stack([x, y]).astype(np.float32).ravel())
+    points.foreach_set("interpolation", np.full(len(kept), BEZIER, np.int32))

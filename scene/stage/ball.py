@@ -1,0 +1,80 @@
+"""The ball: a mesh of the regulation size, and its way over the pitch with the roll that goes with it."""
+
+from __future__ import annotations
+
+import bmesh
+import bpy
+import numpy as np
+
+from ...beyond_mocap.base.time_series import interpolate
+from ...beyond_mocap.motion import quaternion
+from ...beyond_mocap.motion.track.ball_path import BallPath
+from ..core import channels
+from ..core.material import colour
+from ..core.measure import frames_per_second, units_per_metre, whole_frames
+
+RADIUS = 0.11  # metres, Laws of the Game: circumference 0.68 to 0.70 m
+ROLLING_BELOW = 0.16  # metres of the centre's height up to which the ground turns the ball
+
+
+def create(context: bpy.types.Context, name: str, collection, radius: float = RADIUS) -> bpy.types.Object:
+    """A ball object of `radius` m with dark patches where a football has its pentagons, in `collection`."""
+    mesh = bpy.data.meshes.new(name)
+    shape = bmesh.new()
+    bmesh.ops.create_icosphere(shape, subdivisions=4, radius=radius * units_per_metre(context.scene))
+    patches = _pentagons()
+    for face in shape.faces:
+        face.smooth = True
+        face.material_index = int(np.max(patches @ np.array(face.normal)) > 0.94)
+    shape.to_mesh(mesh)
+    shape.free()
+    mesh.materials.append(colour("Ball white", (0.9, 0.9, 0.9), 0.4))
+    mesh.materials.append(colour("Ball black", (0.01, 0.01, 0.012), 0.4))
+    ball = bpy.data.objects.new(name, mesh)
+    ball.rotation_mode = "QUATERNION"
+    collection.objects.link(ball)
+    return ball
+
+
+def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start: float) -> bpy.types.Action:
+    """Bake the ball's way and roll, a key on every whole scene frame; the path's first sample is at frame `start`."""
+    fps = frames_per_second(scene)
+    seconds = path.times - path.times[0]
+    frames = whole_frames(start, float(seconds[-1]), fps)
+    at = (frames - start) / fps
+    places = interpolate(at, seconds, path.positions)
+    group = "Object Transforms"
+    curves = {
+        "location": (group, places * units_per_metre(scene)),
+        "rotation_quaternion": (group, rolling(places) if path.rotations is None else _turned(path, at)),
+    }
+    return channels.animate(ball, f"{ball.name} path", frames, curves)
+
+
+def _turned(path: BallPath, at: np.ndarray) -> np.ndarray:
+    """Rotations (F, 4) of a path that has its own, at seconds (F,) after its first sample."""
+    seconds = path.times - path.times[0]
+    after = np.clip(np.searchsorted(seconds, at), 1, len(seconds) - 1)
+    share = np.clip((at - seconds[after - 1]) / (seconds[after] - seconds[after - 1]), 0.0, 1.0)
+    return quaternion.continuous(quaternion.slerp(path.rotations[after - 1], path.rotations[after], share))
+
+
+def rolling(places: np.ndarray) -> np.ndarray:
+    """Rotations (F, 4) of a ball whose centre passes `places` (F, 3) metres: it rolls on the ground, in the air it
+    keeps the turn per frame with which it left the ground."""
+    step = np.diff(places, axis=0)
+    turn = np.stack([-step[:, 1], step[:, 0], np.zeros(len(step))], axis=1) / RADIUS  # up x step: rotation vectors
+    for i in np.flatnonzero(places[1:, 2] > ROLLING_BELOW):
+        turn[i] = turn[i - 1] if i else turn[i]
+    out = quaternion.identity(len(places))
+    for i, spin in enumerate(quaternion.from_rotation_vector(turn)):
+        out[i + 1] = quaternion.multiply(spin, out[i])
+    return quaternion.continuous(quaternion.normalized(out))
+
+
+def _pentagons() -> np.ndarray:
+    """Directions (12, 3) of a football's pentagons: the corners of an icosahedron."""
+    golden = (1.0 + 5.0**0.5) / 2.0
+    corners = [(0.0, a, b * golden) for a in (-1.0, 1.0) for b in (-1.0, 1.0)]
+    corners = np.array([np.roll(corner, shift) for corner in corners for shift in range(3)])
+    return corners / np.linalg.norm(corners[0])

@@ -1,0 +1,170 @@
+"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, and a camera
+that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study
+lacked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...beyond_mocap.files.whole import beside, whole_folder
+from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.motion.track.ball_path import BallPath
+from ..core import action, channels
+from ..rigs import armature
+from ..stage import ball, body
+from ..core.aside import scene_aside
+from ..core.material import colour
+from ..core.measure import frames_per_second, whole_frames
+
+SHIRT = (0.30, 0.32, 0.35)  # linear RGB, no team's
+CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
+HIGH = 0.95  # metres of that middle above the floor
+GLIDE = 1.0  # seconds of the running mean by which the camera follows
+_AROUND, _TILE = 24.0, 1.0  # metres of floor beyond the way, and of a tile: a foot that slides is seen against them
+
+
+@dataclass(frozen=True)
+class Look:
+    """How clips are filmed. engine: Blender's name. size: pixels (width, height). fps: frames a second. samples: of a
+    pixel. movie: whether an MP4 is written, else a folder of numbered PNGs."""
+
+    engine: str
+    size: tuple[int, int]
+    fps: int
+    samples: int
+    movie: bool = True
+
+
+def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> None:
+    """Render a motion to `path`: a movie, or a folder of pictures, written whole or not at all. Nothing stays in the
+    file. ball_path: its ball, whose first sample is at the motion's first frame."""
+    with scene_aside("Study") as scene:
+        _settings(scene, look)
+        scene.frame_start, scene.frame_end = 1, 1 + int(motion.duration * look.fps + 1e-4)
+        _player(scene, motion)
+        if ball_path is not None:
+            ball.write(ball.create(bpy.context, "Ball", scene.collection), ball_path, scene, float(scene.frame_start))
+        _floor(scene, motion)
+        _light(scene)
+        _camera(scene, motion)
+        if look.movie:
+            with beside(path, path.suffix) as part:
+                _render(scene, str(part))
+        else:
+            with whole_folder(path) as part:
+                _render(scene, f"{part}/")
+
+
+def engine_here(wanted: str) -> str:
+    """Blender's name of an engine in this version: EEVEE has had two. AUTO is Cycles where there is no window, for
+    EEVEE is very slow where there is no graphics card. Where the Cycles add-on is off, EEVEE takes its place."""
+    if wanted == "AUTO":
+        wanted = "CYCLES" if bpy.app.background else "EEVEE"
+    if wanted == "CYCLES" and not hasattr(bpy.types.Scene, "cycles"):
+        wanted = "EEVEE"
+    names = {item.identifier for item in bpy.types.RenderSettings.bl_rna.properties["engine"].enum_items}
+    if wanted == "EEVEE":
+        return "BLENDER_EEVEE" if "BLENDER_EEVEE" in names else "BLENDER_EEVEE_NEXT"
+    return {"CYCLES": "CYCLES", "WORKBENCH": "BLENDER_WORKBENCH"}[wanted]
+
+
+def _settings(scene: bpy.types.Scene, look: Look) -> None:
+    render = scene.render
+    render.engine, render.fps, render.fps_base = look.engine, look.fps, 1.0
+    render.resolution_x, render.resolution_y, render.resolution_percentage = *look.size, 100
+    scene.unit_settings.system, scene.unit_settings.scale_length = "METRIC", 1.0
+    if look.engine == "CYCLES":
+        scene.cycles.samples, scene.cycles.use_denoising, scene.cycles.max_bounces = look.samples, False, 2
+    elif look.engine != "BLENDER_WORKBENCH":
+        scene.eevee.taa_render_samples = look.samples
+    else:
+        scene.display.shading.show_shadows = True
+    settings = render.image_settings
+    if hasattr(settings, "media_type"):
+        settings.media_type = "VIDEO" if look.movie else "IMAGE"
+    settings.file_format = "FFMPEG" if look.movie else "PNG"
+    if look.movie:
+        render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
+    render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would tell files and times
+
+
+def _render(scene: bpy.types.Scene, path: str) -> None:
+    scene.render.filepath = path
+    bpy.ops.render.render(animation=True, scene=scene.name)
+
+
+def _player(scene: bpy.types.Scene, motion: Motion) -> None:
+    player = armature.create(bpy.context, motion.skeleton, "Body", scene.collection)
+    body.create(player, "Study", SHIRT, scene.collection, scene, example=motion)
+    action.write(player, motion, scene, float(scene.frame_start))
+    player.hide_render = True
+
+
+def _floor(scene: bpy.types.Scene, motion: Motion) -> None:
+    """Tiles of two greys under the whole way."""
+    low = np.floor(motion.root_positions[:, :2].min(axis=0) - _AROUND)
+    high = np.ceil(motion.root_positions[:, :2].max(axis=0) + _AROUND)
+    across, along = (np.arange(a, b + _TILE, _TILE) for a, b in zip(low, high))
+    corners = np.stack([*np.meshgrid(across, along, indexing="ij"), np.zeros((len(across), len(along)))], axis=-1)
+    number = np.arange(len(across) * len(along)).reshape(len(across), len(along))
+    faces = np.stack([number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]], axis=-1)
+    mesh = bpy.data.meshes.new("Floor")
+    mesh.from_pydata(corners.reshape(-1, 3).tolist(), [], faces.reshape(-1, 4).tolist())
+    for name, grey in (("Floor", 0.30), ("Floor tile", 0.36)):
+        mesh.materials.append(colour(name, (grey, grey, grey), 0.95))
+    tiles = np.add.outer(np.arange(len(across) - 1), np.arange(len(along) - 1)) % 2
+    mesh.polygons.foreach_set("material_index", tiles.ravel().astype(np.int32))
+    scene.collection.objects.link(bpy.data.objects.new("Floor", mesh))
+
+
+def _light(scene: bpy.types.Scene) -> None:
+    """A sun that casts shadows, and a pale sky."""
+    data = bpy.data.lights.new("Sun", "SUN")
+    data.energy, data.angle = 3.0, 0.03
+    sun = bpy.data.objects.new("Sun", data)
+    sun.rotation_euler = (0.75, 0.25, 0.5)
+    scene.collection.objects.link(sun)
+    world = bpy.data.worlds.new("Study")
+    if world.node_tree is None:  # Blender before 5.0 makes it on request
+        world.use_nodes = True
+    sky = next(node for node in world.node_tree.nodes if node.type == "BACKGROUND")
+    sky.inputs["Color"].default_value, sky.inputs["Strength"].default_value = (0.72, 0.76, 0.80, 1.0), 0.8
+    scene.world = world
+
+
+def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
+    """A camera that looks the same way all the time and glides along with the body."""
+    data = bpy.data.cameras.new("Camera")
+    data.lens, data.clip_end = 40.0, 500.0
+    camera = bpy.data.objects.new("Camera", data)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    camera.rotation_euler = _towards(-np.array(CAMERA_FROM))
+    frames = whole_frames(float(scene.frame_start), motion.duration, frames_per_second(scene))
+    seconds = (frames - scene.frame_start) / frames_per_second(scene)
+    way = followed(motion.root_positions[:, :2], motion.fps)
+    times = np.arange(len(motion)) / motion.fps
+    x, y = (np.interp(seconds, times, way[:, axis]) for axis in range(2))
+    places = np.column_stack([x, y, np.full(len(frames), HIGH)]) + CAMERA_FROM
+    channels.animate(camera, "Camera", frames, {"location": ("Object Transforms", places)})
+
+
+def followed(places: np.ndarray, fps: float) -> np.ndarray:
+    """Places (T, 2) m that glide along with a body's: their running mean over GLIDE seconds, ends point-reflected, so
+    that it neither lags nor starts with a jolt."""
+    half = min(int(0.5 * GLIDE * fps), len(places) - 1)
+    if half < 1:
+        return places
+    before, after = 2.0 * places[:1] - places[half:0:-1], 2.0 * places[-1:] - places[-2 : -half - 2 : -1]
+    total = np.cumsum(np.concatenate([np.zeros((1, 2)), before, places, after]), axis=0)
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+
+
+def _towards(way: np.ndarray):
+    from mathutils import Vector
+
+    return Vector(way).to_track_quat("-Z", "Y").to_euler()

@@ -1,0 +1,1 @@
+"""Labels as strips and key moments; the reference video."""

@@ -1,0 +1,288 @@
+"""Timelines are written as NLA strips: laid, changed, taken away, and laid anew for another clock.
+
+Each strip has an action of its own without any curve; its manual frame range is the strip's own place in the scene, so
+that a marker's frame on it is the scene's.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
+from ...beyond_mocap.base.errors import InputError
+from ..core.clock import Clock, nearest_frame
+from .lanes import (
+    AUTOMATIC, MOMENTS, WORDS, PlacedMoment, PlacedSpan, lane_number, marker_frame, moments, placed_span, shows, spans,
+    strip_named, strips, within, written_for,
+)
+from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
+
+
+def write(
+    target: bpy.types.Object, timeline: Timeline, clock: Clock, extent: tuple[float, float] | None = None
+) -> None:
+    """Let the strips say `timeline`, in place of all that they asked for; automatic ones stay.
+
+    extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it.
+    """
+    own(target, clock)
+    for track, strip in list(strips(target)):
+        if strip.action.beyond_mocap.kind != "automatic":
+            _take_away(track, strip)
+    _drop_empty_lanes(target)
+    for span in timeline.spans:
+        _lay(target, span, clock, "span")
+    first, last = extent or _ends(timeline, clock)
+    _moments_strip(target, clock.whole(first), clock.whole(last))
+    for key in timeline.keys:
+        _mark(target, key, clock)
+
+
+def set_automatic(target: bpy.types.Object, timeline: Timeline, clock: Clock) -> None:
+    """Show what a synthesis put in by itself: those spans of its filled `timeline` that nobody asks for, as muted
+    strips in place of the automatic ones before. What was touched of these is asked for and stays."""
+    own(target, clock)
+    placed = spans(target)
+    old = {one.strip for one in placed if one.automatic}
+    for track, strip in list(strips(target)):
+        if strip.name in old:
+            _take_away(track, strip)
+    asked = {one.span for one in placed if not one.automatic and not one.off}
+    for span in timeline.spans:
+        if span not in asked and span.words:
+            _lay(target, span, clock, "automatic")
+
+
+def add_span(target: bpy.types.Object, span: Span, clock: Clock) -> PlacedSpan:
+    """One more span, on the first lane of words that has room; it alone is selected."""
+    own(target, clock)
+    strip = _lay(target, span, clock, "span")
+    _select_only(target, strip.name)
+    return _placed(target, strip.name)
+
+
+def add_moment(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> PlacedMoment:
+    """One more key moment, picked; its lane is lengthened where that is too short."""
+    own(target, clock)
+    strip, index = _mark(target, key, clock)
+    pick(target, strip.name, index)
+    return PlacedMoment(key, strip.name, index, clock.whole(key.time), False, True)
+
+
+def remove_span(target: bpy.types.Object, strip_name: str) -> None:
+    """Take a span's strip away."""
+    check_editable(target)
+    track = next(track for track, strip in strips(target) if strip.name == strip_name)
+    _take_away(track, strip_named(target, strip_name))
+
+
+def remove_moment(target: bpy.types.Object, strip_name: str, index: int) -> None:
+    """Take a key moment's marker away."""
+    check_editable(target)
+    markers = strip_named(target, strip_name).action.pose_markers
+    markers.remove(markers[index])
+
+
+def change_span(target: bpy.types.Object, strip_name: str, span: Span) -> PlacedSpan:
+    """Let a span say something else or be at another time; an automatic one becomes one that is asked for."""
+    check_editable(target)
+    strip, clock = strip_named(target, strip_name), written_for(target)
+    off = strip.mute and strip.action.beyond_mocap.kind == "span"
+    selected, inner = strip.select, [placed for placed in moments(target) if placed.strip == strip_name]
+    remove_span(target, strip_name)
+    laid = _lay(target, span, clock, "span")
+    laid.mute, laid.select = off, selected
+    for placed in inner:
+        _mark(target, placed.key, clock)
+    return _placed(target, laid.name)
+
+
+def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: KeyMoment) -> PlacedMoment:
+    """Let a key moment say something else or be at another time; it is picked."""
+    check_editable(target)
+    clock, strip = written_for(target), strip_named(target, strip_name)
+    frame = clock.whole(key.time)
+    if not strip.frame_start <= frame <= strip.frame_end:
+        remove_moment(target, strip_name, index)
+        return add_moment(target, key, clock)
+    tell(strip.action.pose_markers[index], key, _on_action(strip, frame))
+    pick(target, strip_name, index)
+    return PlacedMoment(key, strip_name, index, frame, False, True)
+
+
+def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
+    """Let this key moment be the only picked one; an empty name picks none."""
+    check_editable(target)
+    for _, strip in strips(target):
+        markers = strip.action.pose_markers
+        for number, marker in enumerate(markers):
+            marker.select = strip.name == strip_name and number == index
+        if strip.name == strip_name and len(markers):
+            markers.active_index = index
+
+
+def relay(target: bpy.types.Object, clock: Clock) -> bool:
+    """Lay the strips for another clock, each on the frames of its exact seconds; whether there was anything to do."""
+    old = written_for(target)
+    if old is None or old == clock:
+        return False
+    check_editable(target)
+    said = {strip.name: span_of(strip, old, target.name) for _, strip in strips(target)}
+    keys = [(strip, marker, key_of(marker, marker_frame(strip, marker), old, target.name))
+            for _, strip in strips(target) for marker in strip.action.pose_markers if shows(strip, marker)]
+    for track in target.animation_data.nla_tracks:
+        place_all([(strip, *frames_of(said[strip.name], clock)) for strip in track.strips if strip.name in said])
+    for _, strip in strips(target):
+        if strip.action.beyond_mocap.kind != "moments":
+            remember(strip, said[strip.name], strip.action.beyond_mocap.kind)
+    for strip, marker, key in keys:
+        frame = clock.whole(key.time)
+        if strip.action.beyond_mocap.kind == "moments":  # its ends were rounded to coarser frames than the key's
+            _lengthen(strip, frame, frame)
+        tell(marker, key, min(max(frame, int(strip.frame_start)), int(strip.frame_end)))
+    target.beyond_mocap_lanes.clock = clock.spelled()
+    return True
+
+
+def own(target: bpy.types.Object, clock: Clock) -> None:
+    """Let the object have lanes on this clock."""
+    check_editable(target)
+    target.animation_data_create()
+    relay(target, clock)
+    target.beyond_mocap_lanes.clock = clock.spelled()
+    tracks = target.animation_data.nla_tracks
+    for name in (AUTOMATIC, WORDS, MOMENTS):  # from bottom to top
+        if name not in tracks:
+            tracks.new().name = name
+
+
+def check_editable(target: bpy.types.Object) -> None:
+    """InputError for an object that another file owns."""
+    if target.library is not None or target.override_library is not None:
+        found = "it is linked from another file" if target.library else "it is a library override"
+        raise InputError(f"object {target.name}", found, "an object of this file", "make it local first")
+
+
+def place(strip: bpy.types.NlaStrip, first: float, last: float) -> None:
+    """Put a strip there at scale 1, its action's range in the same place."""
+    strip.action.use_frame_range = True
+    strip.action.frame_start, strip.action.frame_end = first, last
+    strip.scale, strip.repeat, strip.use_reverse = 1.0, 1.0, False
+    strip.action_frame_start, strip.action_frame_end = first, last
+    strip.frame_start_raw, strip.frame_end_raw = first, last
+
+
+def _lay(target: bpy.types.Object, span: Span, clock: Clock, kind: str) -> bpy.types.NlaStrip:
+    first, last = frames_of(span, clock)
+    lane = lane_with_room(target, AUTOMATIC if kind == "automatic" else WORDS, first, last)
+    strip = _new_strip(lane, f"{target.name} {words_of(span)}", first, last)
+    remember(strip, span, kind)
+    strip.mute = kind == "automatic"
+    return strip
+
+
+def _new_strip(track: bpy.types.NlaTrack, name: str, first: int, last: int) -> bpy.types.NlaStrip:
+    action = bpy.data.actions.new(name)
+    action.use_frame_range = True
+    action.frame_start, action.frame_end = first, last
+    strip = track.strips.new(name, first, action)
+    strip.extrapolation, strip.select = "NOTHING", False
+    return strip
+
+
+def lane_with_room(target: bpy.types.Object, name: str, first: int, last: int) -> bpy.types.NlaTrack:
+    """The first track of that lane with room from first to last, made where there is none."""
+    tracks = target.animation_data.nla_tracks
+    fitting = [track for track in tracks if (lane_number(track) if name == WORDS else track.name.startswith(name))]
+    for track in fitting:
+        if not track.mute and all(last <= strip.frame_start or strip.frame_end <= first for strip in track.strips):
+            return track
+    new = tracks.new(prev=fitting[-1]) if fitting else tracks.new()
+    taken = {track.name for track in tracks}
+    new.name = next(f"{name} {number}" for number in range(2, len(taken) + 3) if f"{name} {number}" not in taken)
+    return new
+
+
+def _mark(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> tuple[bpy.types.NlaStrip, int]:
+    """A new marker for a key moment: its strip and index."""
+    frame = clock.whole(key.time)
+    strip = _moments_strip(target, frame, frame)
+    markers = strip.action.pose_markers
+    marker = markers.new("")
+    tell(marker, key, _on_action(strip, frame))
+    marker.select = False
+    return strip, len(markers) - 1
+
+
+def _moments_strip(target: bpy.types.Object, first: int, last: int) -> bpy.types.NlaStrip:
+    """The strip of key moments that goes from first to last: made, or the nearest one lengthened."""
+    own_strips = [strip for _, strip in strips(target) if strip.action.beyond_mocap.kind == "moments"]
+    if not own_strips:
+        track = target.animation_data.nla_tracks[MOMENTS]
+        strip = _new_strip(track, MOMENTS, first, max(last, first + 1))
+        strip.action.name = f"{target.name} {MOMENTS}"
+        strip.action.beyond_mocap.kind = "moments"
+        return strip
+    strip = min(own_strips, key=lambda one: max(one.frame_start - first, last - one.frame_end, 0.0))
+    _lengthen(strip, first, last)
+    return strip
+
+
+def _lengthen(strip: bpy.types.NlaStrip, first: int, last: int) -> None:
+    """Let a strip reach from first to last at least; its markers stay on their frames."""
+    start, end = min(strip.frame_start, first), max(strip.frame_end, last)
+    if (start, end) == (strip.frame_start, strip.frame_end):
+        return
+    low = strip.action_frame_start + (start - strip.frame_start) / strip.scale
+    high = strip.action_frame_start + (end - strip.frame_start) / strip.scale
+    strip.action.frame_start, strip.action.frame_end = low, high
+    strip.action_frame_start, strip.action_frame_end = low, high
+    strip.frame_start_raw, strip.frame_end_raw = start, end
+
+
+def _on_action(strip: bpy.types.NlaStrip, frame: int) -> int:
+    """The frame of a strip's action that it shows on a frame of the scene."""
+    return nearest_frame(strip.action_frame_start + (frame - strip.frame_start) / strip.scale)
+
+
+def place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
+    """Put all strips of one track in place. They go far away first: one that lands on another would push it."""
+    wanted = sorted(wanted, key=lambda one: one[0].frame_start)
+    far = 1.0 + max((max(strip.frame_end, last) for strip, _, last in wanted), default=0.0)
+    for strip, _, _ in reversed(wanted):
+        strip.frame_start_raw, strip.frame_end_raw = strip.frame_start + far, strip.frame_end + far
+    for strip, first, last in wanted:
+        place(strip, first, last)
+
+
+def _take_away(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip) -> None:
+    """Remove a strip (or the meta strip that holds it) and its action, where nobody else plays that."""
+    top = next(top for top in track.strips if strip in list(within(top)))
+    actions = {inner.action for inner in within(top)}
+    track.strips.remove(top)
+    for action in actions:
+        if action is not None and action.users == 0:
+            bpy.data.actions.remove(action)
+
+
+def _drop_empty_lanes(target: bpy.types.Object) -> None:
+    tracks = target.animation_data.nla_tracks
+    for track in list(tracks):
+        if lane_number(track) > 1 and not track.strips:
+            tracks.remove(track)
+
+
+def _ends(timeline: Timeline, clock: Clock) -> tuple[float, float]:
+    """First and last second that a timeline speaks of."""
+    times = [time for span in timeline.spans for time in (span.start, span.end)] + [key.time for key in timeline.keys]
+    return (min(times), max(times)) if times else (clock.start_time, clock.start_time + 1.0)
+
+
+def _select_only(target: bpy.types.Object, strip_name: str) -> None:
+    for _, strip in strips(target):
+        strip.select = strip.name == strip_name
+
+
+def _placed(target: bpy.types.Object, strip_name: str) -> PlacedSpan:
+    track = next(track for track, strip in strips(target) if strip.name == strip_name)
+    return placed_span(track, strip_named(target, strip_name), written_for(target), target.name)

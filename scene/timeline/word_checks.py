@@ -1,0 +1,140 @@
+"""What is wrong with the words of a timeline, as lines for the panel and the dialog: before anything is synthesized."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import bpy
+
+from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, problems
+from ...beyond_mocap.base.errors import InputError
+from . import lanes
+from ..core import session
+from ..core.settings import absolute
+from .strip_lines import KEPT, base_name, key_of, span_of
+from ..player.subject import name_of
+
+
+class BeyondMocapProblem(bpy.types.PropertyGroup):
+    """One line and where it leads."""
+
+    line: bpy.props.StringProperty(name="Line", description="What is wrong, and what to do")
+    frame: bpy.props.IntProperty(name="Frame", description="The frame that it is about")
+    target: bpy.props.StringProperty(name="Object", description="The object whose strips these are")
+
+
+class BeyondMocapProblems(bpy.types.PropertyGroup):
+    """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
+
+    attached_to = ("WindowManager.beyond_mocap_problems",)
+
+    lines: bpy.props.CollectionProperty(
+        name="Problems", type=BeyondMocapProblem, description="Everything that was found when words last changed"
+    )
+
+
+def built(scene: bpy.types.Scene):
+    """The library that this session has built from the scene's folder, or None."""
+    settings = scene.beyond_mocap
+    folder = absolute(settings.library_folder)
+    return session.library(folder, settings.library_unit or None) if folder else None
+
+
+def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True) -> list[str]:
+    """What is wrong with one span or key moment: words out of the vocabulary, and words of key moments that the built
+    library does not have, with the nearest that it has. asked: of a player; what a clip shows need not be there yet."""
+    library = built(scene)
+    unknown = _unknown(item, library.words if library else frozenset())
+    if asked and library is not None and isinstance(item, KeyMoment) and not unknown:
+        return _missing(scene, Timeline((), (item,)), library)
+    return list(unknown)
+
+
+def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
+    """(frame, line) for everything that is wrong with an object's strips, in time order."""
+    found, timeline, asked = [], [], bool(target.beyond_mocap_dot.player)
+    clock, where = lanes.written_for(target), name_of(target)
+    for track, strip in lanes.strips(target):
+        if strip.mute or track.mute:
+            continue
+        if strip.action.beyond_mocap.kind != "moments":
+            found += _readable(timeline, strip.name, strip.frame_start, lambda: span_of(strip, clock, where))
+        for marker in strip.action.pose_markers:
+            if lanes.shows(strip, marker):
+                frame = lanes.marker_frame(strip, marker)
+                found += _readable(timeline, marker.name, frame, lambda: key_of(marker, frame, clock, where))
+    for frame, item in timeline:
+        found += [(frame, line) for line in lines_for(scene, item, asked)]
+    if asked:  # what a clip shows may overlap: a kick within a run
+        found += _together(target, [item for _, item in timeline])
+    return sorted(found)
+
+
+def keep(context: bpy.types.Context) -> None:
+    """Work the lines out anew for every timeline of the scene; for the panel, which only shows them."""
+    global _known
+    _known = _library_of(context.scene)
+    found = [(target.name, *line) for target in context.scene.objects if lanes.has(target)
+             for line in lines_of(context.scene, target)]
+    kept = context.window_manager.beyond_mocap_problems.lines
+    if [(one.target, one.frame, one.line) for one in kept] == found:
+        return
+    kept.clear()
+    for target, frame, line in found:
+        one = kept.add()
+        one.target, one.frame, one.line = target, frame, line
+
+
+@lru_cache(maxsize=KEPT)
+def _unknown(item: Span | KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
+    """What is wrong with the words themselves; words: the library's own."""
+    timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
+    return tuple(str(error).removeprefix(f"{error.where}: ") for error in problems(timeline, words))
+
+
+def _readable(timeline: list, name: str, frame: float, read) -> list[tuple[int, str]]:
+    """Adds what a strip or marker says to `timeline`; a line where its name cannot be read."""
+    try:
+        timeline.append((round(frame), read()))
+        return []
+    except InputError:
+        return [(round(frame), f"'{base_name(name)}': words have no numbers and no '#'; rename it")]
+
+
+def out_of_date(scene: bpy.types.Scene) -> bool:
+    """Whether another library has been chosen or built since the lines were worked out."""
+    return _known != _library_of(scene)
+
+
+def _library_of(scene: bpy.types.Scene) -> tuple:
+    settings = scene.beyond_mocap
+    return settings.library_folder, settings.library_holds, settings.mirror
+
+
+_known: tuple = ()
+
+
+def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
+    """Spans that overlap and key moments at one time."""
+    timeline = Timeline(tuple(item for item in items if isinstance(item, Span) and item.words),
+                        tuple(item for item in items if isinstance(item, KeyMoment)))
+    clock, found = lanes.written_for(target), []
+    for a, b in zip(timeline.spans, timeline.spans[1:]):
+        if b.start < a.end - 1e-6:
+            both = f"'{' '.join(a.words)}' and '{' '.join(b.words)}'"
+            found.append((clock.whole(b.start), f"{both} overlap; shorten one"))
+    for a, b in zip(timeline.keys, timeline.keys[1:]):
+        if b.time - a.time <= 1e-6:
+            found.append((clock.whole(b.time), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' are at one time"))
+    return found
+
+
+def _missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
+    """The nearest words that the library has, where it lacks those of a key moment."""
+    mirror = scene.beyond_mocap.mirror
+    choices = [key.words for key in library.keys if mirror or not library.clips[key.clip].mirrored]
+    lines = []
+    for key, nearest in missing_keys(timeline, choices):
+        offers = ", ".join(f"'{' '.join(words)}'" for words in nearest)
+        lines.append(f"the library has no '{' '.join(key.words)}'; nearest: {offers or 'nothing'}")
+    return lines

@@ -1,0 +1,105 @@
+"""The commands inside Blender: the same verbs, Blender's own formats, the contract's exit status."""
+
+import importlib
+import pathlib
+import subprocess
+import sys
+
+import bpy
+import pytest
+
+TOP = pathlib.Path(__file__).resolve().parents[3]
+SAMPLE = TOP / "sample_blend"
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "running_4_2")
+
+
+@pytest.fixture(scope="module")
+def order(tmp_path_factory):
+    """Arguments of a short synthesis."""
+    folder = tmp_path_factory.mktemp("order")
+    (folder / "library").mkdir()
+    for name in CLIPS:
+        for suffix in (".bvh", ".txt"):
+            (folder / "library" / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
+    rows = "\n".join(f"{t / 10},{t / 5},0,{t / 5 + 1},0,0.11" for t in range(40))
+    (folder / "track.csv").write_text(f"time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m\n{rows}\n")
+    (folder / "words.txt").write_text("")
+    return ["synthesize", "--library", str(folder / "library"), "--track", str(folder / "track.csv"),
+            "--annotations", str(folder / "words.txt")]
+
+
+@pytest.fixture
+def run(extension):
+    return importlib.import_module(f"{extension.__name__}.operators.command").run
+
+
+@pytest.mark.parametrize("suffix", (".bvh", ".blend", ".fbx", ".glb", ".usdc"))
+def test_every_form_comes_out(run, order, tmp_path, suffix):
+    out = tmp_path / f"player{suffix}"
+    assert run([*order, "--out", str(out)]) == 0
+    assert out.stat().st_size > 1000
+    assert [path.name for path in tmp_path.iterdir()] == [out.name], "something was left beside it"
+
+
+def test_the_blend_file_holds_the_player_and_the_ball(run, order, tmp_path):
+    assert run([*order, "--out", str(tmp_path / "player.blend"), "--fps", "25"]) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "player.blend"))
+    scene = bpy.context.scene
+    assert scene.render.fps == 25 and scene.frame_start == 0 and scene.frame_end == 97
+    assert {"Player", "Ball"} <= {thing.name for thing in bpy.data.objects}
+    assert bpy.data.objects["Player"].animation_data.action_slot is not None
+    scene.frame_set(50)
+    ball = bpy.data.objects["Ball"].matrix_world.translation
+    assert tuple(ball) == pytest.approx((5.0, 0.0, 0.11), abs=0.05)
+
+
+def test_exit_status(run, order, tmp_path, capfd):
+    assert run(["no-such-verb"]) == 2
+    assert run([*order, "--out", str(tmp_path / "player.xyz")]) == 2
+    assert run([*order, "--out", str(tmp_path / "nowhere" / "player.blend")]) == 2
+    (tmp_path / "words.txt").write_text("2 header\n")
+    assert run([*order[:-1], str(tmp_path / "words.txt"), "--out", str(tmp_path / "player.blend")]) == 3
+    assert "Traceback" not in capfd.readouterr().err
+    assert list(tmp_path.glob("player*")) == []
+
+
+@pytest.mark.parametrize("suffix", (".bvh", ".blend", ".fbx", ".glb", ".usdc"))
+def test_a_ride_comes_out_in_every_form(run, tmp_path, suffix):
+    (tmp_path / "bend.csv").write_text("x_m,y_m\n0,0\n1,0\n2,1\n2,3\n")
+    out = tmp_path / "out" / f"rider{suffix}"
+    out.parent.mkdir()
+    walk = SAMPLE / "library" / "walking_1_2.bvh"
+    assert run(["path", str(walk), "--path", str(tmp_path / "bend.csv"), "--out", str(out)]) == 0
+    assert out.stat().st_size > 1000 and [path.name for path in out.parent.iterdir()] == [out.name]
+
+
+def test_the_blend_file_of_a_ride_holds_the_rider_on_its_path(run, tmp_path):
+    (tmp_path / "line.csv").write_text("x_m,y_m\n5,-2\n5,20\n")
+    walk = SAMPLE / "library" / "walking_1_2.bvh"
+    words = ["path", str(walk), "--path", str(tmp_path / "line.csv"), "--out", str(tmp_path / "rider.blend")]
+    assert run(words) == 0
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "rider.blend"))
+    scene, player = bpy.context.scene, bpy.data.objects["Player"]
+    scene.frame_set(scene.frame_end)
+    hips = player.matrix_world @ player.pose.bones[0].head
+    assert hips.x == pytest.approx(5.0, abs=0.1) and hips.y > 0.0
+
+
+def test_batch_makes_blenders_own_files_without_an_installed_extension(tmp_path):
+    (tmp_path / "line.csv").write_text("x_m,y_m\n0,0\n0,9\n")
+    walk = SAMPLE / "library" / "walking_1_2.bvh"
+    words = ["path", walk, "--path", tmp_path / "line.csv", "--loop", "--out", tmp_path / "rider.blend"]
+    command = [sys.executable, "-P", TOP / "batch.py", "--", *words]
+    environment = {"BLENDER_USER_RESOURCES": str(tmp_path), "PATH": "/usr/bin:/bin"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and (tmp_path / "rider.blend").stat().st_size > 1000, done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments, status", ((["--version"], 0), (["mirror", "missing.bvh", "out.bvh"], 2)))
+def test_batch_needs_no_installed_extension(tmp_path, arguments, status):
+    command = [sys.executable, "-P", str(TOP / "batch.py"), "--", *arguments]
+    environment = {"BLENDER_USER_RESOURCES": str(tmp_path), "PATH": "/usr/bin:/bin"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=120)
+    assert done.returncode == status, done.stderr
+    assert ("missing.bvh" in done.stderr) == (status == 2) and "Traceback" not in done.stderr

@@ -1,0 +1,332 @@
+"""The one watcher: what raises does not end it, undo between two looks leaves nothing of what was undone, and nothing
+is left of it when the extension is switched off in the middle of anything."""
+
+import importlib
+import pathlib
+import threading
+import time
+from types import SimpleNamespace
+
+import bpy
+import pytest
+from conftest import EXTENSION
+from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
+from test_turns import Context, Windows, hand  # noqa: F401
+from undo import state
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"
+
+
+@pytest.fixture(autouse=True)
+def clocks(monkeypatch):
+    """Blender's own timers of windows, with the stand-in for all else."""
+    def add(_self, *_, **__):
+        return bpy.context.window_manager.event_timer_add(0.05, window=bpy.context.window)
+
+    monkeypatch.setattr(Windows, "event_timer_add", add)
+
+
+@pytest.fixture
+def room():
+    return lambda name: importlib.import_module(f"{EXTENSION}.{name}")
+
+
+@pytest.fixture
+def live(room):
+    return room("scene.core.live")
+
+
+class Windowed:
+    """Blender's `bpy`, but for the window that it has and what the status bar says."""
+
+    def __init__(self):
+        self.said = ["Searching"]
+        self.app = SimpleNamespace(background=False, timers=bpy.app.timers, handlers=bpy.app.handlers,
+                                   is_job_running=bpy.app.is_job_running)
+        self.data = SimpleNamespace(workspaces=[SimpleNamespace(status_text_set=self.said.append)])
+
+    def __getattr__(self, name):
+        return getattr(bpy, name)
+
+
+@pytest.fixture
+def windowed(extension, room, live, monkeypatch):
+    """The extension as it is registered where there is a window; as it was before, in the end."""
+    extension.unregister()
+    stand_in = Windowed()
+    monkeypatch.setattr(live, "bpy", stand_in)
+    monkeypatch.setattr(room("scene.core.window"), "bpy", stand_in)
+    extension.register()
+    yield stand_in
+    extension.unregister()
+    monkeypatch.undo()
+    extension.register()
+
+
+def planted(live, **does):
+    watcher = live.Watcher(name="Planted", **does)
+    live._watchers.remove(watcher)
+    return watcher
+
+
+def test_what_raises_is_reported_once_and_the_next_look_comes(live, capsys):
+    looks = []
+
+    def look():
+        looks.append(1)
+        raise ValueError("planted trouble")
+
+    watcher = planted(live, look=look, restored=look)
+    assert [watcher.tick() for _ in range(3)] == [live.IDLE] * 3
+    watcher.hear("restored")
+    assert len(looks) == 4 and watcher.dirty
+    assert capsys.readouterr().err.count("ValueError: planted trouble") == 1
+    work = bpy.context.window_manager.beyond_mocap_work
+    assert work.trouble == "Planted has failed; see the system console"
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert bpy.context.window_manager.beyond_mocap_work.trouble == ""
+
+
+def test_a_wish_of_meanwhile_is_not_lost(live):
+    """What is marked while it settles is looked at again; what rests is not."""
+    answers = [True, False]
+    watcher = planted(live, settle=lambda scene: answers.pop(0))
+    for left in (1, 0, 0):
+        watcher.tick()
+        assert len(answers) == left
+    watcher = planted(live, settle=lambda scene: watcher.mark())
+    watcher.tick()
+    assert watcher.dirty
+
+
+def test_it_waits_until_the_hand_rests(live, monkeypatch):
+    seen, holds = [], [True]
+    monkeypatch.setattr(live, "is_running", lambda names: "TRANSFORM_OT" in names and "A_OT_b" in names and holds[0])
+    watcher = planted(live, held_by=("A_OT_b",), settle=lambda scene: seen.append("settle"),
+                      dragged=lambda scene: seen.append("drag"))
+    watcher.tick()
+    holds[0] = False
+    watcher.mark()
+    watcher.tick()
+    assert seen == ["drag"]
+    watcher.since -= live.RESTED
+    watcher.tick()
+    assert seen == ["drag", "settle"]
+
+
+def test_what_is_to_come_soon_comes_once_and_as_often_as_it_asks(live, windowed):
+    waits = [0.1, None]
+
+    def action():
+        live.soon(action, 0.1)  # while it runs
+        return waits.pop(0)
+
+    live.soon(action, 0.1)
+    live.soon(action, 0.1)
+    call = live._timers[action]
+    assert call() is None and live._timers[action] is not call  # the newer one goes on
+    newer = live._timers.pop(action)
+    bpy.app.timers.unregister(call)
+    bpy.app.timers.unregister(newer)
+    assert not live.is_waiting(action)
+
+
+def rider(room):
+    """A body on a path, looked at; and the file as it is then."""
+    bpy.ops.beyond_mocap.import_clips(filepath=str(SAMPLE / "walking_1_2.bvh"))
+    body = bpy.context.object
+    bpy.ops.beyond_mocap.edit_path()
+    look(room)
+    bpy.ops.ed.undo_push(message="on a path")
+    return body
+
+
+def look(room):
+    """What the timer does once something has changed."""
+    watcher = room("scene.path_editing.live").WATCHER
+    watcher.mark()
+    watcher.tick()
+    assert not watcher.dirty
+
+
+@pytest.mark.parametrize("order", ["edit push", "edit push look", "edit look push", "edit look push look",
+                                   "edit look edit push", "edit push look look"])
+def test_undo_between_two_looks_brings_everything_back(room, order):
+    """Whichever looks come before and after the step that undo takes back, nothing of what they wrote is left after the
+    next one; and redo likewise."""
+    rider(room)
+    before = state()
+    for what in order.split():
+        if what == "edit":
+            bpy.context.object.data.splines[0].bezier_points[1].co.y += 1.0
+            bpy.context.view_layer.update()
+        elif what == "push":
+            bpy.ops.ed.undo_push(message="moved")
+        else:
+            look(room)
+    moved = [*state()["drawn"].values()]
+    bpy.ops.ed.undo()
+    assert room("scene.path_editing.live").WATCHER.dirty  # it has heard of the undo, which no change has to tell
+    room("scene.path_editing.live").WATCHER.tick()
+    assert state() == before
+    bpy.ops.ed.redo()
+    room("scene.path_editing.live").WATCHER.tick()
+    after = state()
+    assert [*after["drawn"].values()] == moved and after["keys"] != before["keys"]
+    bpy.ops.ed.undo()
+    room("scene.path_editing.live").WATCHER.tick()
+    assert state() == before
+
+
+def test_update_then_a_look_then_undo_is_one_step(room):
+    """Live looks between the button and undo, and between undo and redo."""
+    rider(room)
+    bpy.context.object.data.splines[0].bezier_points[1].co.y += 1.0
+    bpy.ops.ed.undo_push(message="moved")
+    moved = state()
+    assert bpy.ops.beyond_mocap.update_path("EXEC_DEFAULT", True) == {"FINISHED"}
+    after = state()
+    look(room)
+    assert state() == after
+    bpy.ops.ed.undo()
+    assert state() == moved
+    bpy.ops.ed.redo()
+    look(room)
+    assert state() == after
+
+
+def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatch):
+    """Figures that a thread works out while undo comes between are those of another motion."""
+    riders, measure = room("scene.path_editing.riders"), room("scene.path_editing.measure")
+    body, go = rider(room), threading.Event()
+    name = body.name
+    body.beyond_mocap_ride.live = False
+    bpy.ops.ed.undo_push(message="not live")
+    figures = body.beyond_mocap_ride.figures
+    bpy.context.object.location.y += 1.0
+    bpy.context.view_layer.update()
+    riders.renew(bpy.context.scene, body)
+    bpy.ops.ed.undo_push(message="moved")
+    monkeypatch.setattr(measure, "REST", 0.0)
+    monkeypatch.setattr(measure, "_figures", lambda *_: go.wait(10.0) and {"root_error_m": "of what was undone"})
+    while not measure._running:
+        measure.WATCHER.tick()
+    job = measure._running[0][0]
+    bpy.ops.ed.undo()
+    body = bpy.data.objects[name]
+    go.set()
+    while not job.poll():
+        time.sleep(0.01)
+    for _ in range(5):
+        measure.WATCHER.tick()
+    assert body.beyond_mocap_ride.figures == figures and riders.shown(body) is None
+    bpy.ops.ed.redo()
+    assert riders.shown(bpy.data.objects[name]) is not None
+
+
+def left_over(room):
+    """What of ours Blender would still call, and what still runs."""
+    found = [f"{name}: {function}" for name in dir(bpy.app.handlers)
+             if isinstance(functions := getattr(bpy.app.handlers, name), list)
+             for function in functions if function.__module__.startswith(EXTENSION)]
+    found += [f"menu: {function}" for name in dir(bpy.types) for function in drawn_in(getattr(bpy.types, name))
+              if function.__module__.startswith(EXTENSION)]
+    window, live = room("scene.core.window"), room("scene.core.live")
+    found += [*map(str, (*window._drawn, *window._clocks, *live._timers, *room("scene.result.queue").names()))]
+    found += [job.kind for job in room("scene.core.background")._newest.values() if not job.stale]
+    found += [str(one) for one in room("scene.match.child")._running if one.poll() is None]
+    found += ["stream"] if room("scene.stream.receiver").listener() is not None else []
+    found += ["rally"] if room("scene.stream.play").rally() is not None else []
+    return found + ["queue"] * room("scene.result.queue").worked()
+
+
+def drawn_in(menu):
+    return getattr(getattr(menu, "draw", None), "_draw_funcs", ())
+
+
+def endless(progress, cancelled, _hurry=None):
+    while not cancelled():
+        progress(0.5, "half")
+        time.sleep(0.01)
+
+
+def a_background_job(room, context):
+    """A button whose work goes on in a thread, as Build Library or Make Match."""
+    button = room("operators.verb").BackgroundVerb()
+    button.bl_label, button.kind = "Button", "test"
+    button.job = room("scene.core.background").Job("test", endless)
+    context.workspace = SimpleNamespace(status_text_set=lambda text: None)
+    button.started(context)
+    while not button.job.fraction:
+        button.modal(context, SimpleNamespace(type="TIMER"))
+
+
+def a_match_child(room, _context):
+    """The process that makes a match."""
+    child, background = room("scene.match.child"), room("scene.core.background")
+    script = "import time, sys; print('{\"progress\": 0.5}', file=sys.stderr, flush=True); time.sleep(60)"
+    child.subprocess, kept = SimpleNamespace(**vars(child.subprocess)), child.subprocess
+    child.subprocess.Popen = lambda command, **options: kept.Popen([command[0], "-c", script], **options)
+    try:
+        job = background.Job("match", lambda progress, cancelled, _: child.run(["match"], progress, cancelled))
+        while not job.fraction:
+            job.poll()
+    finally:
+        child.subprocess = kept
+
+
+def a_stream(room, _context):
+    room("scene.stream.receiver").start(bpy.context.scene.beyond_mocap_stream)
+    room("scene.stream.follow").began()
+
+
+def a_live_update(room, _context):
+    """Throws, flights, overlays and figures are worked out in threads of their own."""
+    job = room("scene.core.background").Job
+    jobs = [job(room(f"scene.{name}").KIND, endless)
+            for name in ("throws.live", "passes.live", "overlays.store", "ride.measure")]
+    room("scene.throws.live")._seen["job"] = "body", 0, jobs[0]
+    room("scene.passes.live")._running.append(jobs[1])
+    room("scene.overlays.store")._running.append((jobs[2], "take"))
+    room("scene.path_editing.measure")._running.append((jobs[3], 0, 0))
+    room("scene.core.live").soon(room("scene.timeline.strip_events")._later, 0.1)
+
+
+def a_menu_of_words(room, _context):
+    """Annotate by Keys draws over every editor of time and space."""
+    room("operators.annotate")._watch()
+
+
+STARTS = (a_background_job, a_match_child, a_stream, a_live_update, a_menu_of_words)
+
+
+def assert_nothing_is_left(extension, room, windowed):
+    assert room("scene.core.live")._timers and room("scene.core.window")._drawn
+    timers = [*room("scene.core.live")._timers.values()]
+    assert all(map(bpy.app.timers.is_registered, timers))
+    extension.unregister()
+    assert left_over(room) == [] and windowed.said[-1] is None
+    assert not any(map(bpy.app.timers.is_registered, timers))
+    end = time.monotonic() + 20.0
+    while ours := [one.name for one in threading.enumerate() if one.name.startswith("beyond-mocap")]:
+        assert time.monotonic() < end, f"still at work: {ours}"
+        time.sleep(0.02)
+    extension.register()
+    work = bpy.context.window_manager.beyond_mocap_work
+    assert (work.kind, work.waiting) == ("", "")
+
+
+@pytest.mark.parametrize("start", STARTS, ids=lambda start: start.__name__)
+def test_switched_off_in_the_middle_nothing_is_left(start, extension, room, windowed):
+    start(room, Context())
+    assert_nothing_is_left(extension, room, windowed)
+
+
+def test_switched_off_while_players_are_made_nothing_is_left(hand, extension, room, windowed):  # noqa: F811
+    hand.pause = 20.0
+    button = hand.press()
+    hand.run(button, until=lambda: button.job is not None and button.job.fraction == 0.5)
+    hand.queue.work(True)
+    button.clock = room("scene.core.window").start_clock(hand.context)
+    assert hand.context.window_manager.beyond_mocap_work.kind and hand.queue.names()
+    assert_nothing_is_left(extension, room, windowed)

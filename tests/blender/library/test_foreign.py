@@ -1,0 +1,175 @@
+"""Motions from FBX, glTF and USD: what Blender's exporters wrote comes back where it was."""
+
+import importlib
+
+import bpy
+import made
+import numpy as np
+import pytest
+from undo import assert_one_step, state
+
+
+@pytest.fixture
+def rooms(extension):
+    names = ("armature", "action", "foreign", "body")
+    return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
+
+
+EXPORTERS = {
+    ".fbx": lambda path: bpy.ops.export_scene.fbx(
+        filepath=path, add_leaf_bones=False, bake_anim_simplify_factor=0.0, bake_anim_use_nla_strips=False,
+        bake_anim_use_all_actions=False),
+    ".glb": lambda path: bpy.ops.export_scene.gltf(filepath=path, export_format="GLB"),
+    ".usdc": lambda path: bpy.ops.wm.usd_export(filepath=path, export_animation=True),
+}
+
+
+def exported(core, rooms, path, fps=30, lie=lambda rig: None):
+    """A known motion on an armature with a body, written by Blender's exporter; the motion. The file is empty after.
+    lie: how the armature object itself is moved, turned and scaled before it gets its motion."""
+    motion = made.motion(core, 61, float(fps))
+    scene = bpy.context.scene
+    scene.render.fps = fps
+    scene.frame_start, scene.frame_end = 1, 61
+    rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    lie(rig)
+    rooms["action"].write(rig, motion, scene, 1.0)
+    rooms["body"].create(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
+    EXPORTERS[path.suffix](str(path))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    return motion
+
+
+def places_of(core, motion, names):
+    places, _ = core("motion.motion").forward_kinematics(motion)
+    return places[:, [motion.skeleton.index(name) for name in names]]
+
+
+@pytest.mark.parametrize("ending", sorted(EXPORTERS))
+@pytest.mark.parametrize("fps", [30, 60])
+def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, ending, fps):
+    path = tmp_path / f"clip{ending}"
+    motion = exported(core, rooms, path, fps)
+    bpy.context.scene.render.fps = 24
+    before = state()
+    takes = rooms["foreign"].read(path)
+    assert state() == before and bpy.context.scene.name == "Scene"
+    back = takes[0].motion
+    assert back.fps == pytest.approx(fps) and len(takes) == 1
+    assert set(back.skeleton.names) == set(motion.skeleton.names)
+    assert len(back) == len(motion)
+    apart = np.linalg.norm(
+        places_of(core, back, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
+    assert apart.max() < 1e-3, apart.max()
+    clip = rooms["foreign"].as_clip(back)
+    apart = np.linalg.norm(
+        places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
+    assert apart.max() < 1e-3, apart.max()
+
+
+@pytest.mark.parametrize("ending", [".fbx", ".glb"])
+def test_an_armature_that_is_turned_moved_and_scaled(core, rooms, tmp_path, ending):
+    def lie(rig):
+        rig.location, rig.rotation_euler, rig.scale = (3.0, -1.0, 0.5), (1.2, 0.3, -0.7), (2.0, 2.0, 2.0)
+
+    path = tmp_path / f"clip{ending}"
+    motion = exported(core, rooms, path, 30, lie)
+    back = rooms["foreign"].read(path)[0].motion
+    apart = np.linalg.norm(places_of(core, back, motion.skeleton.names)[:, 0] - motion.root_positions, axis=-1)
+    assert apart.max() < 1e-3
+    grown = np.linalg.norm(back.skeleton.offsets[back.skeleton.index("LeftLeg")])
+    assert grown == pytest.approx(
+        2.0 * np.linalg.norm(motion.skeleton.offsets[motion.skeleton.index("LeftLeg")]), rel=1e-3
+    )
+
+
+def test_several_animations_of_one_file(core, rooms, tmp_path):
+    path = tmp_path / "two.glb"
+    scene = bpy.context.scene
+    scene.render.fps = 30
+    motion = made.motion(core, 61)
+    rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    for name, count in (("short", 31), ("long", 61)):
+        rooms["action"].write(rig, motion.frames(0, count), scene, 1.0, name)
+    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_animation_mode="ACTIONS")
+    bpy.ops.wm.read_homefile(use_empty=True)
+    takes = rooms["foreign"].read(path)
+    assert [len(take.motion) for take in takes] == [61, 31] and "long" in takes[0].name
+    bpy.ops.beyond_mocap.import_clips(filepath=str(path))
+    assert len([thing for thing in bpy.data.objects if thing.type == "ARMATURE"]) == 2
+
+
+def test_files_without_a_motion_are_told(rooms, tmp_path):
+    broken = tmp_path / "broken.fbx"
+    broken.write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + b"\1" * 300)
+    bpy.ops.mesh.primitive_cube_add()
+    box = tmp_path / "box.glb"
+    bpy.ops.export_scene.gltf(filepath=str(box), export_format="GLB")
+    before = state()
+    for path, told in ((broken, "cannot be read"), (box, "no armature"), (tmp_path / "gone.glb", "no such file"),
+                       (tmp_path / "x.abc", "no such file")):
+        with pytest.raises(Exception, match=told):
+            rooms["foreign"].read(path)
+    assert state() == before
+
+
+def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
+    path = tmp_path / "clip.glb"
+    motion = exported(core, rooms, path)
+    bpy.context.scene.render.fps = 30
+    assert_one_step(bpy.ops.beyond_mocap.import_clips, filepath=str(path))
+    rig = bpy.context.object
+    assert rig.name == "clip" and [o.type for o in bpy.data.objects] == ["ARMATURE"]
+    read = rooms["action"].read(rig, bpy.context.scene)
+    apart = np.linalg.norm(
+        places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
+    )
+    assert apart.max() < 1e-3
+
+
+@pytest.fixture
+def mixed(core, rooms, tmp_path):
+    """A library of a BVH, an FBX and a GLB clip with words beside them, and a broken FBX."""
+    folder = tmp_path / "library"
+    (folder / "below").mkdir(parents=True)
+    core("files.bvh.bvh").write(folder / "walk.bvh", made.motion(core, 91))
+    exported(core, rooms, folder / "below" / "jog.fbx")
+    exported(core, rooms, folder / "low.glb")
+    (folder / "broken.fbx").write_bytes(b"Kaydara FBX Binary  \0\x1a\0" + b"\1" * 300)
+    (folder / "walk.txt").write_text("0 3 walking front\n")
+    (folder / "below/jog.txt").write_text("0 2 jogging front\n")
+    (folder / "low.txt").write_text("0 2 kick right low\n1.2 kick right low\n")
+    bpy.context.scene.beyond_mocap.library_folder = str(folder)
+    return folder
+
+
+def test_a_library_of_foreign_clips_is_built_and_a_broken_one_left_out(core, mixed):
+    before = state()
+    assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
+    listing = bpy.context.window_manager.beyond_mocap_clips
+    paths = {clip.path: clip.words for clip in listing.shown}
+    assert set(paths) == {"walk.bvh", "below/jog.fbx", "low.glb"} and paths["below/jog.fbx"].startswith("jogging")
+    assert (mixed / ".beyond_mocap/converted/below/jog.fbx.bvh").is_file()
+    after = state()
+    assert {key for key in before if before[key] != after[key]} <= {"settings", "scenes"}
+    core("library.build").build(mixed)  # as the command line does, afterwards
+    bpy.ops.beyond_mocap.import_clip(path="below/jog.fbx", dressed=False)
+    assert bpy.context.object.name == "jog"
+
+
+def test_a_clip_is_converted_once_and_again_when_it_changes(core, rooms, mixed):
+    foreign = rooms["foreign"]
+    assert len(foreign.Queue(mixed, None).todo) == 3
+    bpy.ops.beyond_mocap.build_library()
+    assert [path.name for path in foreign.Queue(mixed, None).todo] == ["broken.fbx"]
+    exported(core, rooms, mixed / "low.glb", 60)
+    assert sorted(path.name for path in foreign.Queue(mixed, None).todo) == ["broken.fbx", "low.glb"]
+
+
+def test_a_folder_of_broken_clips_alone(tmp_path):
+    (tmp_path / "a.fbx").write_bytes(b"no FBX")
+    bpy.context.scene.beyond_mocap.library_folder = str(tmp_path)
+    with pytest.raises(RuntimeError, match="no BVH file below it"):
+        bpy.ops.beyond_mocap.build_library()

@@ -1,0 +1,266 @@
+"""What is drawn and told of a take: prepared once, where the body is; curves and jumps are one step and come and go."""
+
+import importlib
+import pathlib
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+from undo import assert_one_step, state
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
+CLIPS = ("standing_1", "walking_1_2", "walk_jog_walk", "jogging_2_9", "jogging_turn_left", "running_4_2",
+         "kick_low_inside")
+WORDS = "5.0 kick right low inside\n"
+
+
+@pytest.fixture(scope="session")
+def library_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("seen_library")
+    for name in CLIPS:
+        for suffix in (".bvh", ".txt"):
+            (folder / f"{name}{suffix}").symlink_to(SAMPLE / "library" / f"{name}{suffix}")
+    return folder
+
+
+@pytest.fixture
+def room(extension):
+    """room("core.session") -> that module of the scene room; what was made is forgotten afterwards."""
+    names = extension.__name__
+    yield lambda name: importlib.import_module(f"{names}.scene.{name}")
+    importlib.import_module(f"{names}.scene.overlays.store").clear()
+    importlib.import_module(f"{names}.scene.core.session").clear()
+
+
+@pytest.fixture
+def shown(tmp_path, library_folder, room):
+    """A player with a ball whose take is shown; the settings."""
+    time = np.arange(0.0, 10.01, 0.1)
+    lines = ["time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m"]
+    lines += [
+        f"{t:.1f},{2.9 * t:.3f},{np.sin(0.3 * t):.3f},{2.9 * t + 0.5:.3f},{np.sin(0.3 * t):.3f},0.11" for t in time
+    ]
+    (tmp_path / "runner.csv").write_text("\n".join(lines) + "\n")
+    (tmp_path / "runner.txt").write_text(WORDS)
+    bpy.context.scene.beyond_mocap.library_folder = str(library_folder)
+    bpy.ops.beyond_mocap.import_tracking(filepath=str(tmp_path / "runner.csv"))
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    return bpy.context.scene.beyond_mocap
+
+
+def prepare_now(store):
+    """All that is missing, at once instead of by timer and thread."""
+    store._prepared.update(store._work(store._missing(bpy.context.scene), None, lambda: False, None))
+
+
+@pytest.fixture
+def prepared(shown, room):
+    prepare_now(room("overlays.store"))
+    return room("overlays.store").prepared(shown.players[0].take)
+
+
+def test_every_overlay_has_what_it_draws(prepared, shown, room):
+    take = room("core.session").made(shown.players[0].take).take
+    assert set(prepared.meshes) == {"track", "footprints", "seams", "moments", "speed"}
+    for meshes in prepared.meshes.values():
+        for mesh in meshes:
+            assert mesh.points.dtype == mesh.colours.dtype == np.float32
+            assert len(mesh.points) == len(mesh.colours) and len(mesh.points) % {"TRIS": 3, "LINES": 2}[mesh.kind] == 0
+            assert np.isfinite(mesh.points).all() and mesh.colours.min() >= 0.0 and mesh.colours.max() <= 1.0
+    assert len(prepared.meshes["seams"][0].points) == 2 * len(take.seams)
+    assert prepared.pieces[0].start == pytest.approx(take.start_time) and len(prepared.pieces) == len(take.seams) + 1
+    assert [label.text for label in prepared.labels][0].startswith("5.00 s  kick right low inside")
+
+
+def test_soles_stand_where_feet_stand(prepared):
+    soles = prepared.meshes["footprints"][0].points.reshape(-1, 17 * 3, 3)[:, :, :2].mean(axis=1)
+    standing = prepared.toes[prepared.stands][:, :2]
+    assert np.linalg.norm(soles[:, None] - standing, axis=-1).min(axis=1).max() < 0.2
+
+
+def test_left_and_right_soles_are_mirrored(room):
+    shapes = room("overlays.shapes")
+    heel, toe = np.zeros((2, 2)), np.tile([0.15, 0.0], (2, 1))
+    fill, edge = shapes.soles(heel, toe, np.zeros(2), np.array([0, 1]), 0.02)
+    left, right = edge.reshape(2, -1, 3)
+    assert np.allclose(left * [1, -1, 1], right) and np.allclose(edge[:, 2], 0.02)
+    assert 0.2 < np.ptp(left[:, 0]) < 0.33 and left[:, 1].max() > -left[:, 1].min()
+
+
+def test_rails_run_beside_the_track(room):
+    path = np.stack([np.linspace(0, 5, 40), np.zeros(40)], axis=1)
+    points, owner = room("overlays.shapes").rails(path, 0.1, 0.2, 0.0)
+    assert len(points) == len(owner) and np.allclose(points[:, 0], path[owner][:, 0])
+    assert np.allclose(np.unique(np.round(np.abs(points[:, 1]), 4)), [0.1, 0.2])
+    still = np.zeros((5, 2))
+    assert np.isfinite(room("overlays.shapes").rails(still, 0.1, 0.2, 0.0)[0]).all()
+
+
+def test_colours_grow_from_good_to_bad(room):
+    colours = room("overlays.colours")
+    found = colours.scaled(np.array([0.0, 0.015, 9.0, np.nan]), colours.ROOT_STOPS)
+    assert np.allclose(found[:3, :3], [colours.BLUE, colours.YELLOW, colours.VERMILION], atol=1e-6)
+    assert np.allclose(found[3, :3], colours.GREY)
+
+
+def test_why_is_told_for_the_piece_at_the_playhead(prepared, shown, room):
+    store, scene = room("overlays.store"), bpy.context.scene
+    for piece in prepared.pieces[:3]:
+        scene.frame_set(int(np.ceil(1 + piece.start * scene.render.fps)) + 1)
+        store.tell_why(scene)
+        assert bpy.context.window_manager.beyond_mocap_playhead.why.splitlines()[0] == piece.name
+    assert any(line.startswith("cost ") for line in prepared.pieces[0].lines)
+    scene.frame_set(-500)
+    store.tell_why(scene)
+    assert bpy.context.window_manager.beyond_mocap_playhead.why == ""
+
+
+@pytest.mark.parametrize("method", ["distance", "blocks"])
+def test_takes_of_the_other_methods_are_told_too(shown, room, method):
+    shown.method = method
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    prepare_now(room("overlays.store"))
+    found = room("overlays.store").prepared(bpy.context.scene.beyond_mocap.players[0].take)
+    assert found.pieces and all(len(piece.lines) >= 3 for piece in found.pieces)
+    assert "track" in found.meshes and "footprints" in found.meshes
+
+
+def test_what_no_player_shows_is_forgotten(prepared, shown, room):
+    store = room("overlays.store")
+    take = shown.players[0].take
+    store.sync(bpy.context.scene)
+    assert store.prepared(take) is prepared
+    bpy.ops.beyond_mocap.discard()
+    store.sync(bpy.context.scene)
+    assert store.prepared(take) is None
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.01])
+def test_what_is_drawn_follows_the_body(shown, room, scale):
+    scene, body = bpy.context.scene, shown.players[0].body
+    scene.unit_settings.scale_length = scale
+    bpy.ops.beyond_mocap.discard()
+    bpy.ops.beyond_mocap.synthesize()
+    body = scene.beyond_mocap.players[0].body
+    take = room("core.session").made(scene.beyond_mocap.players[0].take).take
+    body.location, body.rotation_euler, body.scale = (3.0 / scale, -2.0, 0.0), (0.0, 0.0, 1.1), (1.5, 1.5, 1.5)
+    scene.frame_set(31)
+    world = room("overlays.place").take_to_world(scene, body)
+    at = room("overlays.place").seconds_at(scene) - take.start_time
+    bone = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[take.motion.skeleton.names[0]]
+    root = [
+        np.interp(at * take.motion.fps, np.arange(len(take.motion)), take.motion.root_positions[:, i]) for i in range(3)
+    ]
+    assert np.allclose(world @ Vector(root), body.matrix_world @ bone.head, atol=2e-3 / scale)
+
+
+@pytest.mark.parametrize("form", ["ACTION", "STRIPS"])
+def test_accepted_results_still_know_where_they_lay(shown, room, form):
+    bpy.ops.beyond_mocap.accept(form=form)
+    body = bpy.context.scene.beyond_mocap.players[0].body
+    body.location.x += 2.0
+    bpy.context.view_layer.update()
+    assert room("overlays.place").take_to_world(bpy.context.scene, body).translation.x == pytest.approx(2.0, abs=1e-5)
+
+
+def test_lines_of_the_report_keep_their_seconds(shown):
+    player = shown.players[0]
+    names = [line.split(":")[0] for line in player.quality.splitlines()]
+    assert "Feet slide" in names and all(len(line.split("\t")) == 3 for line in player.quality.splitlines())
+    root = next(line for line in player.quality.splitlines() if line.startswith("Off track:"))
+    assert root.split("\t")[1:] == ["≤ 0.50", "met"]
+    text, second, status = player.moments.splitlines()[0].split("\t")
+    assert text.startswith("5.0 s  kick") and float(second) == 5.0 and status in {"met", "missed"}
+    for line in player.warnings.splitlines():
+        text, seconds = line.split("\t")
+        first = float(text.split("-")[0].split(" ")[0].rstrip(",")) if text[0].isdigit() else None
+        assert first is None or float(seconds.split()[0]) == pytest.approx(first, abs=0.06)
+
+
+def test_words_met_is_at_least_what_is_wanted(room):
+    report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
+    lines = room("result.quality").quality(report).splitlines()
+    assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed",
+                     "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
+
+
+def test_jump_goes_to_the_second_and_selects_the_body(shown):
+    assert_one_step(bpy.ops.beyond_mocap.jump_to, seconds=5.0, player="runner")
+    scene = bpy.context.scene
+    assert scene.frame_current == 1 + 5 * scene.render.fps
+    body = scene.beyond_mocap.players[0].body
+    assert bpy.context.view_layer.objects.active == body and body.select_get()
+    with pytest.raises(RuntimeError, match="nobody; expected a name in the list"):
+        bpy.ops.beyond_mocap.jump_to(seconds=1.0, player="nobody")
+
+
+def test_a_line_about_several_stretches_goes_from_one_to_the_next(shown):
+    scene, seen = bpy.context.scene, []
+    scene.frame_set(1)
+    for _ in range(4):
+        bpy.ops.beyond_mocap.jump_to(stops="4.000 1.000 2.500")
+        seen.append((scene.frame_current - 1) / scene.render.fps)
+    assert seen == pytest.approx([1.0, 2.5, 4.0, 1.0], abs=0.03)
+    with pytest.raises(RuntimeError, match="stops: 'soon'; expected seconds"):
+        bpy.ops.beyond_mocap.jump_to(stops="soon")
+
+
+def test_jump_at_another_frame_rate(shown):
+    scene = bpy.context.scene
+    scene.render.fps, scene.render.fps_base = 24, 1.001
+    bpy.ops.beyond_mocap.jump_to(seconds=4.0)
+    assert scene.frame_current == round(1 + 4.0 * 24 / 1.001)
+
+
+def test_error_curves_are_one_step_and_say_what_the_report_says(shown, room):
+    assert_one_step(bpy.ops.beyond_mocap.error_curves)
+    player = bpy.context.scene.beyond_mocap.players[0]
+    data, report = player.body.data, room("core.session").made(player.take).report
+    action = data.animation_data.action
+    curves = room("core.channels").curves(action, data.animation_data.action_slot)
+    values = np.array([curves['["Root Error (cm)"]', 0].evaluate(f) for f in range(1, 241)])
+    assert values.mean() == pytest.approx(100 * report["root_error_m"]["mean"], rel=0.05)
+    pieces = np.array([curves['["Piece (0 or 1)"]', 0].evaluate(f) for f in range(1, 301)])
+    assert np.sum(np.diff(pieces) != 0.0) == len(room("core.session").made(player.take).take.seams)
+    bpy.context.scene.frame_set(120)
+    assert data["Root Error (cm)"] == pytest.approx(values[119], abs=1e-4)
+
+
+def test_error_curves_go_again_and_leave_nothing(shown):
+    before = state()
+    bpy.ops.beyond_mocap.error_curves()
+    assert state() != before
+    bpy.ops.beyond_mocap.error_curves(remove=True)
+    assert state() == before
+    data = bpy.context.scene.beyond_mocap.players[0].body.data
+    assert not any(name for name in data.keys() if name.startswith(("Root", "Slide", "Piece")))
+
+
+def test_error_curves_go_with_the_take(shown, room):
+    before = {action.name for action in bpy.data.actions}
+    bpy.ops.beyond_mocap.accept()
+    bpy.ops.beyond_mocap.error_curves()
+    first = bpy.context.scene.beyond_mocap.players[0].body.data.animation_data.action.name
+    bpy.ops.beyond_mocap.synthesize()  # a preview: the curves are those of the new take
+    player = bpy.context.scene.beyond_mocap.players[0]
+    assert room("result.error_curves").there(player.body) and player.body.data.animation_data.action.name == first
+    bpy.ops.beyond_mocap.discard()
+    assert room("result.error_curves").there(bpy.context.scene.beyond_mocap.players[0].body)
+    bpy.ops.beyond_mocap.error_curves(remove=True)
+    assert {action.name for action in bpy.data.actions} == before
+
+
+def test_error_curves_go_with_a_preview_that_made_the_body(shown):
+    bpy.ops.beyond_mocap.error_curves()
+    bpy.ops.beyond_mocap.discard()
+    assert not [action.name for action in bpy.data.actions if "error" in action.name] and not len(bpy.data.armatures)
+
+
+def test_without_a_take_buttons_say_what_to_do():
+    with pytest.raises(RuntimeError, match="Synthesize first"):
+        bpy.ops.beyond_mocap.error_curves()
+    scene = bpy.context.scene
+    scene.frame_set(7)
+    assert bpy.ops.beyond_mocap.jump_to(seconds=2.0) == {"FINISHED"}  # no player: the frame alone
+    assert scene.frame_current == 1 + 2 * scene.render.fps

@@ -1,0 +1,171 @@
+"""What is out of date is told, each cause by its line, and the button that is offered mends it."""
+
+import importlib
+import os
+
+import bpy
+import numpy as np
+import pytest
+
+from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+from test_result import one  # noqa: F401  (fixture)
+
+
+@pytest.fixture
+def renew(extension):
+    freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
+    return lambda: freshness.renew(bpy.context.scene, bpy.context.scene.beyond_mocap.players[0])
+
+
+@pytest.fixture
+def made(one):  # noqa: F811
+    bpy.ops.beyond_mocap.synthesize()
+    bpy.ops.beyond_mocap.accept()
+    return one
+
+
+def test_nothing_is_out_of_date_at_first(renew, made, ready):  # noqa: F811
+    assert (renew().lines, renew().notes, renew().mend) == ("", "", "")
+    made.use, made.shirt = False, (0, 0, 1)
+    assert renew().lines == ""
+
+
+@pytest.mark.parametrize("change, line", [
+    (lambda settings, match: setattr(settings, "alpha", 0.5), "choices in step 3"),
+    (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0",
+                                                                                                            ",0.1")),
+     "track"),
+    (lambda settings, match: setattr(settings, "track_window", 2.0), "choices"),
+    (lambda settings, match: bpy.data.objects.remove(settings.players[0].body), "body has been deleted"),
+])
+def test_each_cause_has_its_line_and_update_mends_it(renew, made, ready, match, change, line):  # noqa: F811
+    change(ready, match)
+    assert line in renew().lines and renew().mend == "update"
+    assert bpy.ops.beyond_mocap.update(player=made.name) == {"FINISHED"}
+    assert renew().lines == ""
+
+
+def test_words_of_a_text_stay_the_words(renew, made, ready, session):  # noqa: F811
+    """A player without strips gets none by a synthesis: strips would count more than the text."""
+    scene = session.__name__.rpartition(".")[0]
+    dots, strips = (importlib.import_module(f"{scene}.{name}") for name in ("dots", "strips"))
+    dots.remove(bpy.context.scene, made)
+    text = bpy.data.texts.new("words")
+    text.write("6.0 kick right\n")
+    made.annotation_text = text
+    assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
+    assert strips.read(made, bpy.context.scene) is None and renew().lines == ""
+    text.write("8.0 12.0 jogging\n")
+    assert "words" in renew().lines
+
+
+def test_words(renew, made, ready, session):  # noqa: F811
+    plans = importlib.import_module(f"{session.__name__.rpartition('.')[0]}.plans")
+    strips = importlib.import_module(f"{session.__name__.rpartition('.')[0]}.strips")
+    strips.add_moment(bpy.context, made, 9.0, ("kick",))
+    assert "words" in renew().lines
+    bpy.ops.beyond_mocap.update()
+    assert renew().lines == "" and session.made(made.take).plan.timeline == plans.plan_of(ready, made)[0].timeline
+
+
+def test_the_library_on_disk(renew, made, ready, tmp_path):  # noqa: F811
+    folder = bpy.path.abspath(ready.library_folder)
+    clip = os.path.join(folder, "standing_1.txt")
+    target = os.path.realpath(clip)
+    os.unlink(clip)
+    with open(clip, "w", encoding="utf-8") as file:
+        file.write(open(target, encoding="utf-8").read() + "\n# looked through\n")
+    assert "library" in renew().lines and renew().mend == "build_library"
+    os.unlink(clip)
+    os.symlink(target, clip)
+    assert renew().lines == ""
+
+
+def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made, session, tmp_path):  # noqa: F811
+    bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
+    bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=8.0, end=9.5)
+    bpy.ops.beyond_mocap.accept()
+    made.body.pose.bones["LeftArm"].keyframe_insert("rotation_quaternion", frame=50.5)
+    before = session.made(made.take).take
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "kept.blend"))
+    session.clear()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
+    player = bpy.context.scene.beyond_mocap.players[0]
+    assert "not in this session" in renew().lines and "1 hand-made key:" in renew().notes
+    assert player.result.state == "ACCEPTED"
+    bpy.ops.beyond_mocap.update()
+    after = session.made(player.take).take
+    np.testing.assert_array_equal(after.motion.rotations, before.motion.rotations)
+    np.testing.assert_array_equal(after.motion.root_positions, before.motion.root_positions)
+    assert renew().lines == "" and player.result.hand_keys == 1
+
+
+def test_a_stretch_is_another_solution_and_pressed_again_a_third(made, session):  # noqa: F811
+    first = session.made(made.take).take
+    bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
+    second = session.made(made.take).take
+    bpy.ops.beyond_mocap.resynthesize_stretch(player=made.name, start=3.0, end=5.0)
+    third = session.made(made.take).take
+    for one_, other in ((first, second), (second, third), (first, third)):
+        off = np.any(one_.motion.rotations != other.motion.rotations, axis=(1, 2))
+        assert off[3 * 30 : 5 * 30].mean() > 0.5 and not off[: 1 * 30].any() and not off[8 * 30 :].any()
+    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "within", player=made.name, start=3.0, end=50.0)
+
+
+def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
+    made.body.select_set(False)
+    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "nothing says which seconds")
+    scene = bpy.context.scene
+    scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 61, 121
+    take = made.take
+    assert bpy.ops.beyond_mocap.resynthesize_stretch() == {"FINISHED"} and made.take != take
+    bpy.ops.beyond_mocap.accept(form="STRIPS")
+    scene.use_preview_range = False
+    made.body.select_set(True)
+    track = made.body.animation_data.nla_tracks["Beyond Mocap"]
+    for number, strip in enumerate(track.strips):
+        strip.select = number == 2
+    before, seconds = session.made(made.take).take, [
+        (f - 1) / 30 for f in (track.strips[2].frame_start, track.strips[2].frame_end)
+    ]
+    assert bpy.ops.beyond_mocap.resynthesize_stretch() == {"FINISHED"}
+    off = (
+        np.any(before.motion.rotations != session.made(made.take).take.motion.rotations, axis=(1, 2)).nonzero()[0] / 30
+    )
+    assert len(off) and off.min() > seconds[0] - 2.0 and off.max() < seconds[1] + 2.0
+    assert made.result.state == "PREVIEW"
+
+
+def test_variants_to_choose_from(made, session):  # noqa: F811
+    files = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "actions", "armatures", "meshes", "curves")}
+    assert bpy.ops.beyond_mocap.variants(count=3) == {"FINISHED"}
+    variants = made.result.variants
+    assert len(variants) == 3 and made.take == variants[0].name and made.result.state == "PREVIEW"
+    takes = [session.made(variant.name).take for variant in variants]
+    for a in range(3):
+        for b in range(a):
+            assert np.any(takes[a].motion.rotations != takes[b].motion.rotations, axis=(1, 2)).mean() > 0.5
+    assert "% other" in variants[1].summary and "slide" in variants[0].summary
+    assert bpy.ops.beyond_mocap.preview(number=3) == {"FINISHED"}
+    assert made.take == made.result.variants[2].name
+    bpy.ops.beyond_mocap.accept()
+    assert not made.result.variants and made.take
+    now = {kind: len(getattr(bpy.data, kind)) for kind in files}
+    assert {**now, "actions": 0} == {**files, "actions": 0}
+    bodies = [action for action in bpy.data.actions if action.get("beyond_mocap_take")]
+    assert sum("take" in action.name for action in bodies) == 1, bodies
+    refused(bpy.ops.beyond_mocap.preview, "No variants")
+
+
+def test_variants_by_seed_where_the_method_draws_lots(made, session, ready):  # noqa: F811
+    ready.method = "blocks"
+    assert bpy.ops.beyond_mocap.variants(count=2) == {"FINISHED"}
+    assert [session.made(variant.name).plan.seed for variant in made.result.variants] == [0, 1]
+
+
+def test_fingerprints(extension):
+    freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
+    one = freshness.fingerprint({"a": np.arange(3), "b": (1, "x", None)})
+    assert one == freshness.fingerprint({"b": (1, "x", None), "a": np.arange(3)})
+    assert one != freshness.fingerprint({"a": np.arange(3.0), "b": (1, "x", None)})
+    assert freshness.fingerprint(("ab", "c")) != freshness.fingerprint(("a", "bc"))

@@ -1,0 +1,217 @@
+"""A stream in Blender: a body does what arrives, strikes are recognised, and nothing else in the file changes."""
+
+import importlib
+import pathlib
+import socket
+import threading
+import time
+
+import bpy
+import numpy as np
+import pytest
+from conftest import EXTENSION
+from undo import assert_one_step, press, state
+
+CLIP = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library" / "kick_low_top.bvh"
+OPS = bpy.ops.beyond_mocap
+
+
+@pytest.fixture
+def room():
+    found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
+    yield found
+    found("stream.receiver").stop()
+    found("stream.follow").tell()
+
+
+@pytest.fixture
+def port():
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        number = one.getsockname()[1]
+    bpy.context.scene.beyond_mocap_stream.port = number
+    return number
+
+
+def told():
+    return bpy.context.window_manager.beyond_mocap_streaming
+
+
+def send(core, port, rate=None, way="udp", path=CLIP):
+    """Start a sender; returns its thread."""
+    sender = core("passes.stream.sender").Sender(path, port, way, rate=rate)
+    thread = threading.Thread(target=sender.run, args=(lambda: False,))
+    thread.start()
+    return thread
+
+
+def follow(room, thread, seconds=20.0):
+    """Look until the sender has gone and what it sent is shown; the strikes that were recognised."""
+    look, found, end = room("stream.follow").look, [], time.monotonic() + seconds
+    rest = None
+    while time.monotonic() < end:
+        found.append(look(bpy.context.scene))
+        if not thread.is_alive() and rest is None:
+            rest = time.monotonic() + 0.4
+        if rest is not None and time.monotonic() > rest:
+            break
+        time.sleep(0.01)
+    return [one for one in found if one is not None]
+
+
+def test_the_body_does_what_arrives(room, core, port):
+    assert press(OPS.stream_start) == {"FINISHED"}
+    follow(room, send(core, port, 600.0))
+    body = bpy.context.scene.beyond_mocap_stream.body
+    assert body is not None and body.name == "Stream" and body.animation_data is None
+    motion = core("files.bvh.bvh").read(CLIP).motion
+    places, _ = core("motion.motion").forward_kinematics(motion)
+    bpy.context.view_layer.update()
+    shown = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+    np.testing.assert_allclose(shown, places[-1], atol=2e-3)
+    assert told().state in ("receiving", "stalled") and "Frames: 2" in told().figures
+
+
+def test_its_place_and_units_are_the_scenes(room, core, port):
+    bpy.context.scene.unit_settings.system, bpy.context.scene.unit_settings.scale_length = "METRIC", 0.01
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    body = bpy.context.scene.beyond_mocap_stream.body
+    motion = core("files.bvh.bvh").read(CLIP).motion
+    bpy.context.view_layer.update()
+    hips = body.matrix_world @ body.pose.bones[motion.skeleton.names[0]].head
+    np.testing.assert_allclose(np.array(hips) / 100.0, motion.root_positions[-1], atol=2e-3)
+
+
+def test_it_can_be_put_aside(room, core, port):
+    """Moved and turned by the user, and lying as some imported armatures do."""
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    body = bpy.context.scene.beyond_mocap_stream.body
+    motion = core("files.bvh.bvh").read(CLIP).motion
+    bpy.context.view_layer.update()
+    upright = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+    body.location, body.rotation_euler = (3.0, 1.0, 0.0), (0.0, 0.0, np.pi / 2)
+    bpy.context.view_layer.update()
+    follow(room, send(core, port, 600.0))
+    bpy.context.view_layer.update()
+    moved = np.array([(body.matrix_world @ body.pose.bones[name].head)[:] for name in motion.skeleton.names])
+    np.testing.assert_allclose(moved, upright[:, (1, 0, 2)] * [-1.0, 1.0, 1.0] + [3.0, 1.0, 0.0], atol=2e-3)
+
+
+def test_a_kick_is_recognised_and_told(room, core, port):
+    OPS.stream_start()
+    hits = follow(room, send(core, port))
+    assert [hit.side for hit in hits] == ["right"] and "right foot" in told().hit
+
+
+def test_a_recording_can_be_kept(room, core, port):
+    OPS.stream_start()
+    follow(room, send(core, port, 200.0))
+    bpy.context.scene.frame_set(11)
+    assert_one_step(OPS.stream_keep, seconds=1.0)
+    OPS.stream_keep(seconds=1.0)
+    body = bpy.data.objects["Recorded"]
+    first, last = body.animation_data.action.frame_range
+    assert first == 11.0 and 20 <= last - first <= 25
+
+
+@pytest.mark.parametrize("rubbish", [b"hello", b"\xff\x00" * 300, b"1 2 3\n", b"HIERARCHY\n}}}\n", b"HIERARCHY ROOT"])
+def test_rubbish_changes_nothing(room, port, rubbish):
+    before = state()
+    OPS.stream_start()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for _ in range(20):
+            out.sendto(rubbish, ("127.0.0.1", port))
+    end = time.monotonic() + 5.0
+    while told().line.startswith("Waiting") and time.monotonic() < end:
+        room("stream.follow").look(bpy.context.scene)
+        time.sleep(0.02)
+    assert "no frames" in told().line
+    OPS.stream_stop()
+    after = state()
+    assert {name: after[name] for name in before} == before
+
+
+def test_rubbish_amid_frames_is_left_out(room, core, port):
+    OPS.stream_start()
+    thread = send(core, port, 200.0)
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as out:
+        for _ in range(20):
+            out.sendto(b"rubbish 1 2 3", ("127.0.0.1", port))
+            time.sleep(0.02)
+    follow(room, thread)
+    assert "Left Out: 2" in told().figures and bpy.context.scene.beyond_mocap_stream.body is not None
+
+
+def test_a_stream_that_stops_is_told_and_the_pose_stays(room, core, port, monkeypatch):
+    monkeypatch.setattr(core("passes.stream.listener"), "STALLED", 0.1)
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    room("stream.follow").tell()
+    assert told().state == "stalled" and "no frame" in told().line
+    before = [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
+    room("stream.follow").look(bpy.context.scene)
+    assert before == [tuple(bone.rotation_quaternion) for bone in bpy.context.scene.beyond_mocap_stream.body.pose.bones]
+
+
+def test_a_file_that_is_loaded_ends_the_stream(room, core, port, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    OPS.stream_start()
+    listener = room("stream.receiver").listener()
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert room("stream.receiver").listener() is None and not listener.running
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as again:
+        again.bind(("127.0.0.1", port))
+
+
+def test_a_taken_port_is_told(room, port):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", port))
+        with pytest.raises(RuntimeError, match="cannot be listened to"):
+            press(OPS.stream_start)
+    assert not told().on
+
+
+def test_what_cannot_be_pressed_says_why(room, port):
+    with pytest.raises(RuntimeError, match="press Start Stream first"):
+        OPS.stream_stop()
+    OPS.stream_start()
+    with pytest.raises(RuntimeError, match="press Stop Stream first"):
+        OPS.stream_start()
+    with pytest.raises(RuntimeError, match="nothing has arrived yet"):
+        press(OPS.stream_keep)
+
+
+def test_a_suits_file_that_is_none(room, port, tmp_path):
+    bpy.context.scene.beyond_mocap_stream.clip = str(tmp_path / "none.bvh")
+    with pytest.raises(RuntimeError, match="no such file"):
+        press(OPS.stream_start)
+    assert room("stream.receiver").listener() is None
+
+
+def test_a_body_that_was_removed_is_made_anew(room, core, port):
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    bpy.data.objects.remove(bpy.context.scene.beyond_mocap_stream.body)
+    follow(room, send(core, port, 600.0))
+    assert bpy.context.scene.beyond_mocap_stream.body is not None
+
+
+def test_a_stream_that_is_given_up_says_why(room, core, port, monkeypatch):
+    monkeypatch.setattr(room("stream.follow"), "MOST_BODIES", 0)
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    told = bpy.context.window_manager.beyond_mocap_streaming
+    assert not told.on and told.state == "failed" and "skeleton has changed" in told.line
+    assert room("stream.receiver").listener() is None and bpy.context.scene.beyond_mocap_stream.body is None
+
+
+def test_a_chosen_armature_is_used(room, core, port):
+    bpy.ops.beyond_mocap.import_clips(filepath=str(CLIP))
+    mine = bpy.context.object
+    mine.animation_data_clear()
+    bpy.context.scene.beyond_mocap_stream.body = mine
+    OPS.stream_start()
+    follow(room, send(core, port, 600.0))
+    assert bpy.context.scene.beyond_mocap_stream.body == mine and "Stream" not in bpy.data.objects

@@ -1,0 +1,183 @@
+"""Play live: strikes of the streamed body become passes of the scene's players, while the scene goes on."""
+
+import importlib
+import pathlib
+import socket
+import threading
+import time
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from conftest import EXTENSION
+from undo import assert_one_step, press
+
+SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend"
+CLIPS = SAMPLE / "passes" / "library"
+OPS = bpy.ops.beyond_mocap
+
+
+@pytest.fixture
+def room():
+    found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
+    yield found
+    found("stream.play").stop()
+    found("stream.receiver").stop()
+    found("stream.follow").tell()
+
+
+@pytest.fixture(scope="module")
+def cache(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache")
+
+
+@pytest.fixture
+def playing(room, cache):
+    """Three players stand, Ann has the ball; 24 frames a second, from frame 5 on."""
+    scene = bpy.context.scene
+    scene.render.fps = 24
+    chosen = bpy.context.preferences.addons[EXTENSION].preferences
+    chosen.cache_folder = str(cache)
+    OPS.passes_sample(sample="three")
+    scene.beyond_mocap_passes.library_folder, scene.beyond_mocap_passes.start_frame = str(CLIPS), 5
+    scene.frame_set(5)
+    assert press(OPS.stream_play) == {"FINISHED"}
+    yield scene
+    chosen.property_unset("cache_folder")
+
+
+def told():
+    return bpy.context.window_manager.beyond_mocap_streaming
+
+
+def kick(core, name="volley_pass"):
+    return core("passes.hits").analyse(core("files.bvh.bvh").read(CLIPS / f"{name}.bvh").motion).strongest
+
+
+def places(scene, frames):
+    """The ball at some frames, metres."""
+    ball, found = scene.beyond_mocap_passes.rally, []
+    for frame in frames:
+        scene.frame_set(frame)
+        found.append(ball.matrix_world.translation[:])
+    return np.array(found)
+
+
+def test_all_stand_and_the_ball_lies(playing, room):
+    assert (
+        room("stream.play").rally().holder == "Ann" and told().playing and told().played.startswith("Ann has the ball")
+    )
+    assert all(row.body is not None for row in playing.beyond_mocap_passes.players)
+    assert playing.frame_end >= 5 + 60 * 24
+    assert np.ptp(places(playing, (5, 100, 900)), axis=0).max() < 1e-6
+
+
+def test_a_strike_is_answered_from_now_on(playing, room, core):
+    playing.frame_set(5 + 48)
+    bodies = [row.body for row in playing.beyond_mocap_passes.players]
+    before = places(playing, range(5, 53))
+    playing.frame_set(5 + 48)
+    piece = room("stream.play").answer_now(playing, kick(core))
+    assert (piece.giver, piece.receiver, piece.clip) == ("Ann", "Ben", "volley_pass.bvh")
+    np.testing.assert_allclose(places(playing, range(5, 53)), before, atol=1e-6)
+    struck = 53 + piece.strike * 24
+    way = places(playing, range(53, 53 + 120))
+    speed = np.linalg.norm(np.diff(way, axis=0), axis=1) * 24
+    assert speed[: int(struck) - 54].max() < 4.0 < speed.max() < 20.0
+    assert [row.body for row in playing.beyond_mocap_passes.players] == bodies
+    assert (
+        "Ben has the ball, passes so far: 1" in told().played and "Ann played volley_pass.bvh to Ben" in told().played
+    )
+
+
+def test_whom_the_user_chooses_gets_it(playing, room, core):
+    play = room("stream.play")
+    with pytest.raises(RuntimeError, match="Ann has the ball"):
+        press(OPS.stream_target, number=1)
+    with pytest.raises(RuntimeError, match="1 to 3"):
+        press(OPS.stream_target, number=7)
+    OPS.stream_target(number=3)
+    assert playing.beyond_mocap_stream.target == "Cho"
+    assert play.answer_now(playing, kick(core)).receiver == "Cho"
+    ben = next(row.body for row in playing.beyond_mocap_passes.players if row.name == "Ben")
+    play.look(playing)
+    bpy.context.view_layer.objects.active = ben
+    play.look(playing)
+    assert play.target(playing) == "Ben"
+
+
+def test_a_stream_is_answered(playing, room, core):
+    """A kick that arrives over the network, told by what it is and laid into the scene."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as one:  # no other run of the tests listens there
+        one.bind(("127.0.0.1", 0))
+        port = one.getsockname()[1]
+    playing.beyond_mocap_stream.port = port
+    OPS.stream_start()
+    sender = core("passes.stream.sender").Sender(CLIPS / "volley_toss.bvh", port)
+    thread = threading.Thread(target=sender.run, args=(lambda: False,))
+    thread.start()
+    look, end = room("stream.follow").look, time.monotonic() + 60.0
+    while room("stream.play").rally().passes == 0 and time.monotonic() < end:
+        look(playing)
+        time.sleep(0.02)
+    thread.join()
+    assert room("stream.play").rally().passes == 1 and "Ann played volley_toss" in told().played
+
+
+def test_what_cannot_be_answered_is_told_and_changes_nothing(playing, room, core):
+    play = room("stream.play")
+    actions = {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
+    tail = replace(kick(core), part="tail")
+    play.struck(playing, tail, 0.0)
+    end = time.monotonic() + 60.0
+    while "has the ball" in told().played and time.monotonic() < end:
+        play.look(playing)
+        time.sleep(0.02)
+    assert play.rally().passes == 0 and play.rally().holder == "Ann" and told().played
+    assert actions == {row.name: row.body.animation_data.action.name for row in playing.beyond_mocap_passes.players}
+
+
+def test_stop_playing(playing, room):
+    assert OPS.stream_end() == {"FINISHED"}
+    assert room("stream.play").rally() is None and not told().playing
+    with pytest.raises(RuntimeError, match="press Play Live first"):
+        OPS.stream_end()
+
+
+def test_a_file_that_is_loaded_ends_it(playing, room):
+    bpy.ops.wm.read_homefile(use_empty=True)
+    assert room("stream.play").rally() is None
+
+
+def test_it_is_one_step(playing, room):
+    OPS.stream_end()
+    OPS.passes_clear()
+    assert_one_step(OPS.stream_play)
+    assert room("stream.play").rally() is None and "Undo has ended" in told().played
+
+
+def test_an_armature_can_show_how(playing, room):
+    """Its strike nearest to the present frame, without any stream; not one that has none."""
+    with pytest.raises(RuntimeError, match="no strike of the foot"):
+        bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
+        press(OPS.stream_act)
+    bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))
+    assert press(OPS.stream_act) == {"FINISHED"}
+    assert room("stream.play").rally().passes == 1 and "Ann played volley_toss" in told().played
+
+
+def test_a_scene_that_is_cleared_ends_it(playing, room):
+    OPS.passes_clear()
+    assert all(row.body is None for row in playing.beyond_mocap_passes.players)
+    room("stream.play").look(playing)
+    assert room("stream.play").rally() is None and "cleared" in told().played
+
+
+def test_choosing_is_one_step(playing):
+    assert_one_step(OPS.stream_target, number=3)
+
+
+def test_an_unknown_holder_is_told(playing):
+    with pytest.raises(RuntimeError, match="holder"):
+        press(OPS.stream_play, holder="Zoe")

@@ -1,0 +1,121 @@
+"""One table of settings: options are made from it, and those of version 0.1 are still there."""
+
+import argparse
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+from settings_page import PAGE, settings_page
+
+from beyond_mocap.__main__ import parser
+from beyond_mocap.ball.physics import THROWN
+from beyond_mocap.base import settings
+from beyond_mocap.base.settings import TABLES, setting
+from beyond_mocap.base.settings.options import option_values
+from beyond_mocap.base.settings.setting import Setting, check_limits
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.path_editing.path_frame import FRAMES
+
+OPTIONS = Path(__file__).resolve().parents[2] / "data" / "options-0.1.txt"
+PROBES = (
+    "", "x", "nan", "-1", "0", "0.001", "0.3", "1", "1.5", "3", "12", "100", "500", "2000", "1e6", "1e10", "1,2,3",
+)  # fmt: skip
+SHARPNESS = Setting(
+    name="sharpness", default=0.25, least=0.0, most=1.0, unit="turns", option="--sharpness", help="of corners",
+    title="Sharpness", tooltip="How sharp corners are", in_preset=True,
+)
+
+
+def verbs_of(top, name=""):
+    """Name and parser of each verb, those below another one too."""
+    for action in top._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for verb, sub in action.choices.items():
+                yield from verbs_of(sub, f"{name} {verb}".strip())
+    yield name, top
+
+
+def takes(action):
+    """Which of PROBES an option takes, a letter each."""
+    def fits(text):
+        try:
+            (action.type or str)(text)
+        except (ValueError, argparse.ArgumentTypeError):
+            return "-"
+        return "+"
+    return "".join(map(fits, PROBES))
+
+
+def lines_of(top):
+    """A line for each option: verb, flags, default as users see it, number of values, choices, what it takes."""
+    for verb, own in verbs_of(top):
+        for action in own._actions:
+            if not isinstance(action, argparse._SubParsersAction):
+                switch = action.nargs == 0 and action.option_strings
+                default = "off" if switch else action.default
+                choices = " ".join(action.choices) if action.choices else ""
+                names = " ".join(action.option_strings) or action.dest
+                what = (verb, names, default, action.nargs, action.required, choices, "" if switch else takes(action))
+                yield " | ".join(map(str, what))
+
+
+def test_the_options_of_0_1_are_still_there():
+    """tests/data/options-0.1.txt is never made again."""
+    now = set(lines_of(parser()))
+    then = OPTIONS.read_text("utf-8").splitlines()
+    assert len(then) > 200
+    assert [line for line in then if line not in now] == []
+
+
+@pytest.fixture
+def with_sharpness(monkeypatch):
+    """A setting more, in the table alone."""
+    monkeypatch.setitem(TABLES, "synthesis", (*TABLES["synthesis"], SHARPNESS))
+    return dict(verbs_of(parser()))["synthesize"]
+
+
+FILES = ["--library", "L", "--track", "T", "--annotations", "A", "--out", "O"]
+
+
+def test_a_row_is_an_option_with_its_default_and_limits(with_sharpness):
+    @dataclass
+    class Corners:
+        sharpness: float
+
+    assert with_sharpness.parse_args(FILES).sharpness == 0.25
+    options = with_sharpness.parse_args([*FILES, "--sharpness", "0.5"])
+    assert option_values(Corners, options, "synthesis") == {"sharpness": 0.5}
+    with pytest.raises(InputError, match="'1.5' is not 0 to 1 turns"):
+        with_sharpness.parse_args([*FILES, "--sharpness", "1.5"])
+    with pytest.raises(InputError, match="^sharpness: "):
+        check_limits(Corners(2.0), settings.rows_of("synthesis"))
+
+
+def test_a_row_is_on_the_page_of_settings(with_sharpness):
+    line = "| `sharpness` | `--sharpness` | Sharpness | 0.25 | 0 to 1 turns | How sharp corners are |"
+    assert line in settings_page()
+
+
+def test_the_page_of_settings_is_up_to_date():
+    assert PAGE.read_text("utf-8") == settings_page(), "run python packaging/settings_page.py"
+
+
+def test_every_row_makes_sense():
+    for group, rows in TABLES.items():
+        assert len({row.name for row in rows}) == len(rows), group
+    for group, row in ((group, row) for group, rows in TABLES.items() for row in rows):
+        where = f"{group} {row.name}"
+        assert row.feature and (row.option or row.tooltip or row.help), where
+        assert not row.option.startswith("--no-") or row.default is True, where
+        assert not row.choices or row.default in (None, *row.choice_names), where
+        if row.least is not None and row.most is not None:
+            assert row.least < row.most and math.isfinite(row.most), where
+
+
+def test_what_the_table_names_is_what_the_core_knows():
+    """The base cannot import them."""
+    assert setting("markers", "ball").choice_names == tuple(THROWN)
+    assert setting("path_editing", "frame").choice_names == FRAMES
+    assert {row.name for row in TABLES["synthesis"]} <= set(Plan.__dataclass_fields__)

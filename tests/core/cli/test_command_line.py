@@ -1,0 +1,558 @@
+"""The command: exit statuses, one line for what is wrong, nothing half-written, and tables that can be read back."""
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.__main__ import _interrupts, main
+from beyond_mocap.annotation import read_timeline
+from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.motion.humanoid import stature
+from beyond_mocap.files.tables import read_ball
+from beyond_mocap.synthesis.provenance import read_provenance
+from beyond_mocap.library.made import KICKED, MADE_FOLDER
+
+TOP = Path(__file__).resolve().parents[3]
+DATA = TOP.parent / "shared" / "data"
+
+# ../shared/contract.md, Report JSON
+REPORT = """
+version seed fps frames duration_s seconds{load,library,search,construct,polish,total} root_error_m{mean,p95,max}
+pelvis_error_m{mean,own} keys
+skate{contact_cm_s,source_contact_cm_s,stance_mm_median,stances_over_21mm,gmd_ratio,source_gmd_ratio}
+seam_jerk_ratio{median,p95,max,share_above_real} foot_correction_m{p95} ik_miss_share pelvis_drop_m
+pelvis_surge_ratio pose_realism loop_share speed_coverage{above,below}
+annotation_similarity{all,keys,eq18_all,eq18_keys} warp_rate{min,max} ground_mm{min,support_max} warnings
+"""
+KEY = """time_s solved_time_s labels clip clip_frame time_error_s position_error_m pelvis_error_m contact_gap_m
+ball_shift_m used_instead"""
+
+
+@pytest.fixture(scope="module")
+def match(tmp_path_factory, track_of):
+    """A folder with a track that has a ball, and annotations with a kick that the library has."""
+    folder = tmp_path_factory.mktemp("match")
+    track = track_of(lambda t: 1.6 + 0.2 * t, 6.0, turn=0.1, ball=True)
+    rows = np.column_stack([track.times, track.positions, track.ball])
+    header = "time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m\n"
+    (folder / "track.csv").write_text(header + "\n".join(",".join(f"{v:.4f}" for v in row) for row in rows) + "\n")
+    (folder / "track_only.csv").write_text(
+        "time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.4f}" for v in r[:3]) for r in rows) + "\n"
+    )
+    (folder / "words.txt").write_text("0 6\n3 kick right\n")
+    (folder / "empty.txt").write_text("")
+    (folder / "header.txt").write_text("3 header\n")
+    return folder
+
+
+@pytest.fixture
+def run(capfd):
+    """run(*arguments) -> status, standard output, lines on standard error."""
+
+    def call(*arguments):
+        capfd.readouterr()
+        status = main([str(argument) for argument in arguments])
+        out, error = capfd.readouterr()
+        return status, out, error.splitlines()
+
+    return call
+
+
+@pytest.fixture
+def synthesize(run, clips_folder, library, match, tmp_path):
+    """synthesize(*more, **options) -> as run; by default the match's track and words, out to tmp_path/out.bvh."""
+
+    def call(*more, **options):
+        options = {"library": clips_folder, "track": match / "track.csv", "annotations": match / "words.txt",
+                   "out": tmp_path / "out.bvh", **options}  # fmt: skip
+        pairs = [part for name, value in options.items() if value is not None for part in (f"--{name}", value)]
+        return run("synthesize", *pairs, *more)
+
+    return call
+
+
+def assert_told(result, status, *parts):
+    """The status, and one line on stderr that says all of `parts`."""
+    code, out, error = result
+    assert code == status, (code, error)
+    assert len(error) == 1 and error[0].startswith("beyond-mocap"), error
+    assert "Traceback" not in error[0]
+    for part in parts:
+        assert str(part) in error[0], error[0]
+    assert out == ""
+
+
+def files_in(folder) -> dict[str, bytes]:
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def test_the_library_is_told(run, clips_folder, library, tmp_path):
+    status, out, error = run("library", clips_folder, "--report", tmp_path / "r.json")
+    assert (status, error) == (0, [])
+    lines = out.splitlines()
+    assert "6 clips" in lines[0] and "0.5 minutes" in lines[0]
+    assert "standing 0.0 m/s, walking 1.4 m/s, jogging 2.8 m/s, running 5.0 m/s" in out
+    assert "kick left inside low" in out and "kick right inside low" in out
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["clips"] == 6 and len(report["gaits"]) == 4 and "kick" in report["words"]
+
+
+def test_the_cache_can_be_put_elsewhere_and_made_anew(run, tmp_path, clip_file):
+    clip_file(tmp_path / "clips" / "walk.bvh", 1.4, 1.5)
+    for more in ((), ("--rebuild",)):
+        assert run("library", tmp_path / "clips", "--cache", tmp_path / "kept", *more)[0] == 0
+    assert (tmp_path / "kept" / "library.npz").is_file() and not (tmp_path / "clips" / ".beyond_mocap").exists()
+
+
+@pytest.mark.parametrize("method", ["path", "distance", "blocks"])
+def test_everything_asked_for_is_written_and_can_be_read(synthesize, run, match, clips_folder, tmp_path, method):
+    status, out, _ = synthesize(
+        method=method, provenance=tmp_path / "p.csv", ball=tmp_path / "b.csv", report=tmp_path / "r.json", fps=25
+    )
+    assert status == 0 and "out.bvh: 151 frames, 6.0 s" in out
+    assert sorted(files_in(tmp_path)) == ["b.csv", "out.bvh", "p.csv", "r.json"]
+    motion = bvh.read(tmp_path / "out.bvh", 0.01).motion
+    provenance, ball = read_provenance(tmp_path / "p.csv"), read_ball(tmp_path / "b.csv")
+    assert len(motion) == len(provenance) == len(ball.times) == 151 and motion.fps == pytest.approx(25.0)
+    assert "kick.bvh" in provenance.clip
+    assert all((clips_folder / clip).is_file() for clip in set(provenance.clip))
+    assert provenance.times[75] == pytest.approx(3.0)
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert_contract(report)
+    key = report["keys"][0]
+    assert (key["clip"], key["time_s"], key["used_instead"]) == ("kick.bvh", 3.0, None)
+    assert abs(key["time_error_s"]) <= 0.5 / 25
+    if method == "path":
+        assert report["root_error_m"]["mean"] < 0.01
+
+
+def assert_contract(report):
+    for item in REPORT.replace("\n", " ").split():
+        name, _, parts = item.rstrip("}").partition("{")
+        assert name in report, name
+        if parts:
+            assert set(parts.split(",")) <= set(report[name]), name
+    for key in report["keys"]:
+        assert set(KEY.split()) <= set(key)
+
+
+def test_what_was_written_can_be_evaluated(synthesize, run, match, clips_folder, tmp_path):
+    assert synthesize(provenance=tmp_path / "p.csv", ball=tmp_path / "b.csv", report=tmp_path / "r.json")[0] == 0
+    status, out, error = run(
+        "evaluate", tmp_path / "out.bvh", "--track", match / "track.csv", "--annotations", match / "words.txt",
+        "--provenance", tmp_path / "p.csv", "--ball", tmp_path / "b.csv", "--library", clips_folder, "--unit", 0.01,
+        "--report", tmp_path / "e.json",
+    )  # fmt: skip
+    assert (status, error) == (0, [])
+    mine, again = (json.loads((tmp_path / name).read_text()) for name in ("r.json", "e.json"))
+    assert_contract(again)
+    assert again["root_error_m"]["mean"] == pytest.approx(mine["root_error_m"]["mean"], abs=1e-3)
+    assert again["keys"][0]["clip"] == mine["keys"][0]["clip"]
+    assert again["frames"] == mine["frames"]
+
+
+def test_what_does_not_belong_together_is_told_by_evaluate(synthesize, run, match, clips_folder, tmp_path):
+    assert synthesize(provenance=tmp_path / "p.csv")[0] == 0
+    (tmp_path / "late.txt").write_text("99 kick right\n")
+    (tmp_path / "other.csv").write_text((tmp_path / "p.csv").read_text().replace(".bvh", "_x.bvh"))
+    both = ("evaluate", tmp_path / "out.bvh", "--library", clips_folder, "--report", tmp_path / "e.json")
+    late = run(*both, "--track", match / "track.csv", "--annotations", tmp_path / "late.txt")
+    assert_told(late, 2, "late.txt:1", "99 s")
+    assert not (tmp_path / "e.json").exists()
+    status, _, error = run(*both, "--provenance", tmp_path / "other.csv")
+    assert status == 0 and "_x.bvh" in error[-1] and "not in" in error[-1]
+    assert run(*both, "--provenance", tmp_path / "p.csv")[2] == []
+
+
+def test_same_seed_same_file(synthesize, tmp_path):
+    contents = []
+    for name in ("a.bvh", "b.bvh"):
+        assert synthesize(out=tmp_path / name)[0] == 0
+        contents.append((tmp_path / name).read_bytes())
+    assert contents[0] == contents[1]
+
+
+def test_an_empty_annotation_file_is_all_automatic(synthesize, match, tmp_path):
+    assert synthesize(annotations=match / "empty.txt", report=tmp_path / "r.json")[0] == 0
+    assert json.loads((tmp_path / "r.json").read_text())["keys"] == []
+
+
+def test_a_track_without_a_ball_writes_none_and_tells(synthesize, match, tmp_path):
+    status, _, error = synthesize(track=match / "track_only.csv", ball=tmp_path / "b.csv")
+    assert status == 0 and not (tmp_path / "b.csv").exists()
+    assert any("has no ball" in line for line in error)
+
+
+def test_windows_line_ends_and_a_byte_order_mark(synthesize, match, tmp_path):
+    for name in ("track.csv", "words.txt"):
+        text = (match / name).read_text().replace("\n", "\r\n")
+        (tmp_path / name).write_bytes(b"\xef\xbb\xbf" + text.encode())
+    assert synthesize(track=tmp_path / "track.csv", annotations=tmp_path / "words.txt")[0] == 0
+
+
+def test_mirror(run, clips_folder, tmp_path):
+    once, twice = tmp_path / "once.bvh", tmp_path / "twice.bvh"
+    assert run("mirror", clips_folder / "walk.bvh", once)[0] == 0
+    assert run("mirror", once, twice)[0] == 0
+    motions = [bvh.read(path, 0.01).motion for path in (clips_folder / "walk.bvh", once, twice)]
+    assert np.allclose(motions[0].root_positions, motions[2].root_positions, atol=1e-4)
+    assert np.allclose(motions[0].root_positions * [1, -1, 1], motions[1].root_positions, atol=1e-4)
+    assert run("mirror", once, once)[0] == 0
+    assert once.read_bytes() == twice.read_bytes()
+
+
+def test_a_console_of_another_script_is_written_to_all_the_same(clips_folder, tmp_path, monkeypatch):
+    console = io.TextIOWrapper(io.BytesIO(), encoding="cp1252", errors="strict")
+    monkeypatch.setattr(sys, "stdout", console)
+    assert main(["mirror", str(clips_folder / "walk.bvh"), str(tmp_path / "\u0110or\u0111e.bvh")]) == 0
+    console.flush()
+    assert b"\\u0110or\\u0111e.bvh: " in console.buffer.getvalue()
+
+
+def test_help_and_version(run):
+    status, out, _ = run("--help")
+    assert status == 0 and "synthesize" in out
+    status, out, _ = run("--version")
+    assert status == 0 and out.startswith("beyond-mocap 0.")
+    assert run("synthesize", "--help")[0] == 0
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [(), ("fly",), ("library",), ("synthesize", "--out", "x.bvh"), ("mirror", "a.bvh"), ("library", "x", "--what")],
+)
+def test_a_wrong_command_line_is_status_2(run, arguments):
+    assert_told(run(*arguments), 2)
+
+
+@pytest.mark.parametrize(
+    "options, parts",
+    [
+        ({"fps": "0"}, ["--fps", "0"]),
+        ({"fps": "-5"}, ["--fps"]),
+        ({"fps": "many"}, ["--fps", "many"]),
+        ({"fps": "nan"}, ["--fps"]),
+        ({"fps": "5000"}, ["fps", "5000"]),
+        ({"alpha": "2"}, ["--alpha", "2"]),
+        ({"omega": "0.5"}, ["omega", "0.5", "1 or more"]),
+        ({"seam-window": "wide"}, ["--seam-window", "wide"]),
+        ({"track-window": "-1"}, ["--track-window", "-1"]),
+        ({"gait": "walking"}, ["--gait", "WORD=CLIP"]),
+        ({"gait": "walking=missing.bvh"}, ["--gait", "missing.bvh"]),
+        ({"seed": "x"}, ["--seed"]),
+        ({"method": "magic"}, ["magic", "path"]),
+        ({"unit": "0"}, ["--unit"]),
+        ({"out": "nowhere/deep/out.bvh"}, ["nowhere/deep/out.bvh", "folder"]),
+        ({"out": "out.xyz"}, ["out.xyz", ".bvh"]),
+        ({"out": "out"}, ["out", ".bvh"]),
+        ({"report": "nowhere/r.json"}, ["nowhere/r.json", "folder"]),
+        ({"provenance": "nowhere/p.csv"}, ["nowhere/p.csv", "folder"]),
+        ({"ball": "."}, ["folder"]),
+        ({"track": "missing.csv"}, ["missing.csv"]),
+        ({"annotations": "missing.txt"}, ["missing.txt"]),
+        ({"library": "missing"}, ["missing", "folder"]),
+        ({"skeleton": "missing.bvh"}, ["missing.bvh"]),
+    ],
+)
+def test_wrong_options_and_missing_files_are_status_2(synthesize, tmp_path, monkeypatch, options, parts):
+    monkeypatch.chdir(tmp_path)
+    assert_told(synthesize(**options), 2, *parts)
+    assert files_in(tmp_path) == {}
+
+
+ROW = "0,0,0\n0.1,0.1,0\n0.2,0.2,0\n"
+
+
+@pytest.mark.parametrize(
+    "content, parts",
+    [
+        (b"time_s,x_m\n0,0\n", ["y_m"]),
+        (b"", []),
+        (b"\x00\x01\x02\x00", []),
+        (("time_s,x_m,y_m\n" + ROW + "0.3,far,0\n").encode(), [":5", "x_m"]),
+        (("time_s,x_m,y_m\n" + ROW + "0.3,1\n").encode(), [":5"]),
+        (b"time_s,x_m,y_m\n0,0,0\n", ["two"]),
+        (b"time_s,x_m,y_m\n0,0,0\n0,1,0\n", []),
+        (b"time_s,x_m,y_m\n0,0,0\n1000,1,0\n2000,2,0\n", ["5 to 100"]),
+        (("time_s,x_m,y_m\n" + ROW + "0.3,1e30,0\n").encode(), [":5"]),
+        (("time_s,x_m,y_m\n" + ROW + "0.3,inf,0\n").encode(), [":5"]),
+        (b"time_s,x_m,y_m\n\xff\xfe,0,0\n", []),
+    ],
+    ids=["column", "empty", "binary", "word", "cells", "one row", "one time", "rate", "huge", "infinite", "not UTF-8"],
+)
+def test_a_broken_track_is_told_with_its_line(synthesize, tmp_path, content, parts):
+    (tmp_path / "bad.csv").write_bytes(content)
+    assert_told(synthesize(track=tmp_path / "bad.csv"), 2, "bad.csv", *parts)
+    assert sorted(files_in(tmp_path)) == ["bad.csv"]
+
+
+@pytest.mark.parametrize(
+    "text, parts",
+    [
+        ("0 6\n3 kikc right\n", [":2", "kikc", "kick"]),
+        ("0 3 walkin\n", [":1", "walkin", "walking"]),
+        ("3 kick\n4 5 walking\n4.5 6 jogging\n", ["overlap"]),
+        ("99 kick right\n", [":1", "99", "track"]),
+        ("-4 2 walking\n", [":1", "track"]),
+        ("walking\n", [":1"]),
+        ("5 3 walking\n", [":1"]),
+        ("3\n", [":1"]),
+        ("3 transition\n", [":1", "transition"]),
+        ("1e99 kick\n", [":1"]),
+    ],
+)
+def test_a_broken_annotation_is_told_with_its_line(synthesize, tmp_path, text, parts):
+    (tmp_path / "bad.txt").write_text(text)
+    assert_told(synthesize(annotations=tmp_path / "bad.txt"), 2, "bad.txt", *parts)
+    assert sorted(files_in(tmp_path)) == ["bad.txt"]
+
+
+BROKEN = {
+    "cut off": lambda c: c[: len(c) * 2 // 3 + 7],
+    "empty": lambda c: b"",
+    "binary": lambda c: bytes(range(256)) * 20,
+    "only a hierarchy": lambda c: c[: c.index(b"MOTION")],
+    "a word among numbers": lambda c: c[:-400] + b" what " + c[-400:],
+    "not a number": lambda c: c[: c.rindex(b"\n", 0, -1)] + b"\n" + b"nan " * 69 + b"\n",
+    "no time": lambda c: c.replace(b"Frame Time: 0.0333", b"Frame Time: -0.333"),
+    "zero time": lambda c: (
+        c[: c.index(b"Frame Time:")] + b"Frame Time: 0\n" + c[c.index(b"\n", c.index(b"Frame Time:")) + 1 :]
+    ),
+    "channels": lambda c: c.replace(b"CHANNELS 3", b"CHANNELS 4", 1),
+}
+
+
+@pytest.mark.parametrize("damage", BROKEN.values(), ids=BROKEN)
+def test_a_broken_recording_is_told(run, synthesize, clip_file, tmp_path, damage):
+    clip_file(tmp_path / "clips" / "a.bvh", 1.4, 1.0)
+    bad = clip_file(tmp_path / "clips" / "bad.bvh", 1.4, 1.0)
+    bad.write_bytes(damage(bad.read_bytes()))
+    before = files_in(tmp_path)
+    assert_told(run("library", tmp_path / "clips"), 2, "bad.bvh")
+    assert_told(synthesize(library=tmp_path / "clips"), 2, "bad.bvh")
+    assert_told(run("mirror", bad, tmp_path / "out.bvh"), 2, "bad.bvh")
+    assert_told(run("evaluate", bad, "--report", tmp_path / "r.json"), 2, "bad.bvh")
+    assert files_in(tmp_path) == before
+
+
+STICK = """HIERARCHY
+ROOT a { OFFSET 0 0 0 CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+JOINT b { OFFSET 0 50 0 CHANNELS 3 Zrotation Xrotation Yrotation End Site { OFFSET 0 50 0 } } }
+MOTION
+Frames: 2
+Frame Time: 0.033333
+0 90 0 0 0 0 0 0 0
+0 90 0 0 0 0 0 0 0
+"""
+
+
+def test_libraries_that_are_none(run, synthesize, match, clip_file, tmp_path):
+    folders = {name: tmp_path / name for name in ("empty", "silent", "stand", "two")}
+    folders["empty"].mkdir()
+    clip_file(folders["silent"] / "walk.bvh", words="")
+    clip_file(folders["stand"] / "stand.bvh", 0.0, 1.5, "standing")
+    clip_file(folders["two"] / "walk.bvh", 1.4, 2.0)
+    other = clip_file(folders["two"] / "child.bvh", 1.4, 1.0)
+    other.write_text(STICK)
+    parts = {"empty": ["BVH"], "silent": ["annotation"], "stand": ["locomotion"], "two": ["child.bvh", "legs"]}
+    for name, folder in folders.items():
+        assert_told(run("library", folder), 2, name, *parts[name])
+        assert_told(synthesize(library=folder, annotations=match / "empty.txt"), 2, name, *parts[name])
+    assert not (tmp_path / "out.bvh").exists()
+
+
+def test_what_the_library_lacks_is_status_3_and_the_nearest_0(synthesize, match, tmp_path):
+    assert_told(synthesize(annotations=match / "header.txt"), 3, "header", "kick", "--nearest")
+    assert files_in(tmp_path) == {}
+    status, _, error = synthesize("--nearest", annotations=match / "header.txt", report=tmp_path / "r.json")
+    assert status == 0 and any("used instead" in line for line in error)
+    key = json.loads((tmp_path / "r.json").read_text())["keys"][0]
+    assert key["labels"] == ["header"] and key["used_instead"]
+
+
+def test_touches_are_solved_where_that_is_asked(synthesize, match, tmp_path, track_of):
+    track = track_of(2.8, 8.0)
+    since = track.times - 4.03
+    ball = track.times * 0.0 + np.where(since < 0, -3.0, 12.0) * since + 4.03 * 2.8 + 0.45
+    rows = zip(track.times, *track.positions.T, ball, np.full(len(ball), 0.11))
+    text = "time_s,x_m,y_m,ball_x_m,ball_y_m,ball_z_m\n"
+    text += "".join(f"{t:.3f},{x:.4f},{y:.4f},{b:.4f},0.0,{z}\n" for t, x, y, b, z in rows)
+    (tmp_path / "kicked.csv").write_text(text)
+    (tmp_path / "words.txt").write_text("0 8\n4.3 kick right\n")
+    asked = {"track": tmp_path / "kicked.csv", "annotations": tmp_path / "words.txt", "report": tmp_path / "r.json"}
+    keys = []
+    for more in ((), ("--solve-touches",)):
+        assert synthesize(*more, **asked)[0] == 0
+        keys += json.loads((tmp_path / "r.json").read_text())["keys"]
+    assert [key["time_s"] for key in keys] == [4.3, 4.3] and keys[0]["solved_time_s"] is None
+    assert keys[1]["solved_time_s"] == pytest.approx(4.03, abs=0.02) and keys[1]["contact_gap_m"] < 0.005
+
+
+def test_mirrors_can_be_forbidden(synthesize, tmp_path):
+    (tmp_path / "left.txt").write_text("3 kick left\n")
+    assert_told(synthesize("--no-mirror", annotations=tmp_path / "left.txt"), 3, "kick")
+    assert synthesize(annotations=tmp_path / "left.txt")[0] == 0
+
+
+def test_outputs_that_stand_already_are_left_alone_on_failure(synthesize, match, tmp_path):
+    names = {"out": "out.bvh", "provenance": "p.csv", "ball": "b.csv", "report": "r.json"}
+    for name in names.values():
+        (tmp_path / name).write_text("mine")
+    paths = {option: tmp_path / name for option, name in names.items()}
+    for failing in ({"annotations": match / "header.txt"}, {"track": match / "none.csv"}, {"library": match}):
+        assert synthesize(**paths, **failing)[0] in (2, 3)
+        assert set(files_in(tmp_path).values()) == {b"mine"}
+    assert synthesize(**paths)[0] == 0
+    assert b"mine" not in files_in(tmp_path).values() and len(files_in(tmp_path)) == 4
+
+
+def test_a_cache_folder_that_is_a_file_is_told(run, clips_folder, tmp_path):
+    (tmp_path / "file").write_text("mine")
+    assert_told(run("library", clips_folder, "--cache", tmp_path / "file"), 2, "file", "folder")
+
+
+def test_json_lines_can_be_read_by_machines(run, synthesize, tmp_path, clip_file):
+    clip_file(tmp_path / "clips" / "walk.bvh", 1.4, 1.5)
+    for status, _, error in (run("library", tmp_path / "clips", "--json"), synthesize("--json")):
+        assert status == 0 and len(error) > 3
+        told = [json.loads(line) for line in error if not line.startswith("note: ")]
+        shares = [line["progress"] for line in told if "progress" in line]
+        assert all(0.0 <= share <= 1.0 for share in shares) and all(line["text"] for line in told if "progress" in line)
+    status, _, error = synthesize("--json", track=tmp_path / "none.csv")
+    assert status == 2 and "none.csv" in error[-1]
+
+
+def test_what_a_library_says_of_itself_is_one_line_to_who_synthesizes(run, synthesize, clips_folder):
+    status, out, _ = run("library", clips_folder)
+    own = [line for line in out.splitlines() if line.startswith("unit ")]
+    status, _, error = synthesize()
+    assert status == 0 and own and not any(note in line for note in own for line in error)
+    assert sum("the command 'library' prints them" in line for line in error) == 1
+
+
+def test_no_progress_where_nobody_looks(run, clip_file, tmp_path):
+    clip_file(tmp_path / "walk.bvh", 1.4, 1.5)
+    assert run("library", tmp_path)[2] == []
+
+
+def started(*arguments):
+    """The command in a process of its own."""
+    environment = {**os.environ, "PYTHONPATH": str(TOP), "OMP_NUM_THREADS": "1"}
+    command = [sys.executable, "-m", "beyond_mocap", *map(str, arguments)]
+    return subprocess.Popen(command, env=environment, stdout=-1, stderr=-1, text=True)
+
+
+def test_python_m_runs_it(clips_folder, library, match, tmp_path):
+    process = started("synthesize", "--library", clips_folder, "--track", match / "track.csv", "--annotations",
+                      match / "header.txt", "--out", tmp_path / "out.bvh")  # fmt: skip
+    out, error = process.communicate(timeout=120)
+    assert (process.returncode, out) == (3, "") and len(error.splitlines()) == 1
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows sends no SIGINT to one process")
+@pytest.mark.parametrize("moment, kind", [("Reading", signal.SIGINT), ("Searching", signal.SIGINT),
+                                          ("Searching", signal.SIGTERM)])  # fmt: skip
+def test_ctrl_c_or_an_end_asked_for_stops_and_leaves_nothing(clips_folder, library, match, tmp_path, moment, kind):
+    times = np.arange(0.0, 240.0, 0.1)
+    rows = np.column_stack([times, 30 * np.sin(times / 9), 20 * np.cos(times / 7)])
+    (tmp_path / "long.csv").write_text(
+        "time_s,x_m,y_m\n" + "\n".join(",".join(f"{v:.3f}" for v in row) for row in rows)
+    )
+    before = files_in(tmp_path)
+    more = ("--cache", tmp_path / "cache") if moment == "Reading" else ()
+    arguments = {"library": clips_folder, "track": tmp_path / "long.csv", "annotations": match / "empty.txt"}
+    outputs = {"out": tmp_path / "out.bvh", "report": tmp_path / "r.json"}
+    options = [part for name, value in {**arguments, **outputs}.items() for part in (f"--{name}", value)]
+    process = started("synthesize", "--json", *options, *more)
+    for line in process.stderr:
+        if json.loads(line)["text"].startswith(moment):
+            process.send_signal(kind)
+            break
+    out, error = process.communicate(timeout=120)
+    assert process.returncode == 130 and out == ""
+    assert "cancelled" in error.splitlines()[-1] and "Traceback" not in error
+    assert files_in(tmp_path) == before
+
+
+def test_the_second_ctrl_c_breaks_off_what_does_not_listen():
+    told = Told(False)
+    before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
+    with _interrupts(told), pytest.raises(KeyboardInterrupt):
+        signal.raise_signal(signal.SIGINT)
+        assert told.cancelled()
+        signal.raise_signal(signal.SIGINT)
+    assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
+
+
+def test_signals_that_python_did_not_set_are_left_as_the_system_has_them(monkeypatch):
+    """Blender sets handlers of its own before Python: `signal.signal` then returns None, which it does not take
+    back."""
+    before = {kind: signal.getsignal(kind) for kind in (signal.SIGINT, signal.SIGTERM)}
+    put = signal.signal
+    with monkeypatch.context() as patched:
+        patched.setattr(signal, "signal", lambda kind, handler: put(kind, handler) and None)
+        with _interrupts(Told(False)):
+            assert signal.getsignal(signal.SIGTERM) not in before.values()
+    after = [signal.getsignal(kind) for kind in before]
+    for kind, handler in before.items():
+        put(kind, handler)
+    assert after == [signal.SIG_DFL, signal.SIG_DFL]
+
+
+needs_data = pytest.mark.skipif(
+    not (DATA / "mocap" / "cmu10").is_dir(), reason="needs the recordings in ../shared/data"
+)
+
+
+@needs_data
+@pytest.mark.parametrize("scenario", [3, 4])
+def test_real_recordings(run, tmp_path_factory, scenario):
+    """CMU's subject 10 as the library: all methods with the nearest words, key times exact; without, status 3."""
+    folder = tmp_path_factory.mktemp("real")
+    cache = tmp_path_factory.getbasetemp() / "cmu10"
+    track, words = (
+        DATA / "tracking" / "scenarios" / f"scenario{scenario}_{kind}" for kind in ("track.csv", "annotations.txt")
+    )
+    library = ("--library", DATA / "mocap" / "cmu10", "--unit", 0.05644, "--cache", cache)
+    written = ("--out", folder / "out.bvh", "--report", folder / "r.json")
+    common = ("synthesize", *library, "--track", track, "--annotations", words, *written)
+    asked = read_timeline(words, 30.0).keys
+    assert_told(run(*common), 3, "--nearest")
+    assert files_in(folder) == {}
+    for method in ("path", "distance", "blocks"):
+        status, _, error = run(*common, "--nearest", "--method", method)
+        assert status == 0 and any("used instead" in line for line in error)
+        report = json.loads((folder / "r.json").read_text())
+        assert_contract(report)
+        assert [(key["time_s"], key["labels"]) for key in report["keys"]] == [(k.time, list(k.words)) for k in asked]
+        for key in report["keys"]:
+            if {"kick", "foot"} & set(key["labels"]):
+                name = key["clip"].removeprefix(MADE_FOLDER)  # by path, a kick on the run is made where it is asked for
+                assert name.startswith(("10_0", KICKED)[: 1 + (method == "path")])
+                assert abs(key["time_error_s"]) <= 0.5 / 30 + 1e-6
+            else:  # nothing in the library is near a header, a slide or a ball on the chest
+                assert key["used_instead"] and key["time_error_s"] is None
+        if method == "path":
+            assert report["root_error_m"]["mean"] <= 0.01
+
+
+def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
+    (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m,hold_s\n2,gaze,30,0,1.5,0.5\n99,left_hand,0,0,1,\n")
+    status, _, error = synthesize(
+        "--strong-foot", "left", "--style", "kick*", report=tmp_path / "r.json", pins=tmp_path / "pins.csv", height=2.0
+    )
+    assert status == 0 and any("99 s: the pin of left_hand lies outside" in line for line in error)
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert [pin["part"] for pin in report["pins"]] == ["gaze", "left_hand"] and report["pins"][0]["miss"] < 0.05
+    assert stature(bvh.read(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)
+    assert_told(synthesize(height=0.1), 2, "--height", "0.5 to 3 metres")
+    (tmp_path / "pins.csv").write_text("time_s,part,x_m,y_m,z_m\n2,nose,30,0,1.5\n")
+    assert_told(synthesize(pins=tmp_path / "pins.csv"), 2, "pins.csv:2", "'nose'")

@@ -1,0 +1,108 @@
+"""A rally that is played live: the holder does what the user did, and everything goes on without a jump."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from beyond_mocap.passes.hits import analyse
+from beyond_mocap.passes.sample_scenes import SAMPLES
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.passes.scene_json import parse_scene
+from beyond_mocap.passes.live_passes import FADE, answer, begin
+from beyond_mocap.motion.motion import forward_kinematics
+
+CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
+
+
+@pytest.fixture(scope="module")
+def library(strikes_library):
+    return strikes_library
+
+
+@pytest.fixture(scope="module")
+def rally(library):
+    return begin(library, parse_scene(SAMPLES["three"]), "Ann")
+
+
+def hit_of(name, side="right"):
+    return analyse(bvh.read(CLIPS / f"{name}.bvh").motion, "foot", side).strongest
+
+
+@pytest.fixture(scope="module")
+def passed(library, rally):
+    """A pass to Cho at 2 s, then a toss to Ben."""
+    first = answer(library, rally, 2.0, hit_of("volley_pass"), "Cho")
+    after = rally.after(first, 2.0)
+    second = answer(library, after, after.free + 0.5, hit_of("volley_toss"), "Ben", bounces=1)
+    return first, after, second, after.after(second, after.free + 0.5)
+
+
+def test_they_stand_where_the_scene_says_and_the_ball_lies(rally):
+    for player in rally.scene.players:
+        played = rally.players[player.name]
+        np.testing.assert_allclose(played.at(0.0).place, player.place, atol=0.1)
+        assert len(played.motion) / played.motion.fps > 60.0
+        moved = np.linalg.norm(played.motion.root_positions[:, :2] - player.place, axis=1)
+        assert moved.max() < 0.25
+    assert np.ptp(rally.ball.positions, axis=0).max() == 0.0
+
+
+def test_the_holder_does_the_most_alike_motion(passed):
+    first, _, second, _ = passed
+    assert (first.giver, first.receiver, first.clip) == ("Ann", "Cho", "volley_pass.bvh")
+    assert (second.giver, second.receiver, second.clip) == ("Cho", "Ben", "volley_toss.bvh")
+
+
+def test_the_ball_comes_to_the_target_and_stays_there(passed):
+    _, after, _, end = passed
+    for rally, name in ((after, "Cho"), (end, "Ben")):
+        assert rally.holder == name
+        place = rally.ball.positions[int(np.searchsorted(rally.ball.times, rally.free + 1.0))]
+        stands = rally.players[name].at(rally.free + 1.0).place
+        assert np.linalg.norm(place[:2] - stands) < 1.5 and place[2] < 0.2
+    assert end.passes == 2
+
+
+def test_nothing_jumps(passed):
+    """No joint and no ball between two frames faster than a strike is."""
+    _, after, _, end = passed
+    for rally in (after, end):
+        speeds = np.linalg.norm(np.diff(rally.ball.positions, axis=0), axis=1) / np.diff(rally.ball.times)
+        assert speeds.max() < 20.0 and np.diff(rally.ball.times).min() > 0.01
+        for played in rally.players.values():
+            places, _ = forward_kinematics(played.motion)
+            assert np.linalg.norm(np.diff(places, axis=0), axis=2).max() * played.motion.fps < 14.0
+
+
+def test_what_was_done_goes_over_into_the_pass(rally, passed):
+    first, after, _, _ = passed
+    old, new = rally.players["Ann"].motion, after.players["Ann"].motion
+    np.testing.assert_allclose(new.root_positions[:61], old.root_positions[:61], atol=1e-9)
+    later = int(FADE * new.fps) + 1
+    np.testing.assert_allclose(new.root_positions[60 + later :], first.motions["Ann"].root_positions[later:])
+    assert after.players["Ben"] is rally.players["Ben"]
+
+
+def test_the_left_foot_is_answered_with_the_left(library, rally):
+    hit = hit_of("volley_pass")
+    left = replace(hit, side="left", vectors=hit.vectors * [1.0, -1.0, 1.0], velocity=hit.velocity * [1.0, -1.0, 1.0])
+    piece = answer(library, rally, 2.0, left, "Ben")
+    places, _ = forward_kinematics(piece.motions["Ann"])
+    feet = [piece.motions["Ann"].skeleton.names.index(name) for name in ("LeftFoot", "RightFoot")]
+    frame = round(piece.strike * piece.motions["Ann"].fps)
+    heights = places[frame, feet, 2]
+    assert heights[0] > heights[1] + 0.05
+
+
+@pytest.mark.parametrize("target, said", [("Ann", "to himself"), ("Zoe", "one of Ann")])
+def test_a_target_that_is_none(library, rally, target, said):
+    with pytest.raises(InputError, match=said):
+        answer(library, rally, 2.0, hit_of("volley_pass"), target)
+
+
+def test_an_unknown_holder(library, rally):
+    with pytest.raises(InputError, match="holder"):
+        begin(library, rally.scene, "Zoe")

@@ -1,0 +1,55 @@
+"""A leg swung to planted places: exact where its joints allow, at their limits where not, and never past them
+between."""
+
+import numpy as np
+import pytest
+
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.synthesis.construct.ball.carry import (
+    LEAST_ANGLE, MOST_ANGLE, Body, Resting, leg, limb_carried, swing_to, swung,
+)
+
+MOST = np.radians(35.0)
+AT = 12
+
+
+@pytest.fixture(scope="module")
+def body():
+    motion = gait(1.4, 1.0, 30.0)
+    return Body.posed(motion.skeleton, motion.root_positions, motion.rotations)
+
+
+def carried(body, place, share):
+    chain = leg(identify(body.skeleton).right)
+    moves = swung(body, chain, swing_to(body, chain, AT, place, MOST), share)
+    rotations = limb_carried(body, Resting.of(body, chain), moves)
+    return Body.posed(body.skeleton, body.root, rotations), chain
+
+
+def angle(body, chain):
+    """(W,) rad inside the knee."""
+    up, down = (body.places[:, joint] - body.places[:, chain[1]] for joint in (chain[0], chain[2]))
+    return np.arccos(np.sum(up * down, axis=1) / np.linalg.norm(up, axis=1) / np.linalg.norm(down, axis=1))
+
+
+@pytest.mark.parametrize("move", [(0.1, 0.1, 0.1), (-0.15, 0.0, 0.1), (0.0, -0.2, 0.15)])
+def test_a_place_in_reach_is_met(body, move):
+    chain = leg(identify(body.skeleton).right)
+    place = body.places[AT, chain[2]] + move
+    after, _ = carried(body, place, (np.arange(len(body.root)) == AT).astype(float))
+    assert after.places[AT, chain[2]] == pytest.approx(place, abs=0.002)
+    others = np.arange(len(body.root)) != AT
+    assert after.places[others] == pytest.approx(body.places[others], abs=1e-9)
+
+
+@pytest.mark.parametrize("move", [(1.5, 0.0, 0.0), (0.0, 0.0, -0.5), (0.2, 0.0, 0.7)])
+def test_no_knee_passes_its_limits_at_any_frame(body, move):
+    chain = leg(identify(body.skeleton).right)
+    after, _ = carried(body, body.places[AT, chain[2]] + move, np.ones(len(body.root)))
+    own, made = angle(body, chain), angle(after, chain)
+    slack = np.radians(1.5)
+    assert np.all(made <= np.maximum(own, MOST_ANGLE) + slack) and np.all(made >= np.minimum(own, LEAST_ANGLE) - slack)
+    before, now = (b.places[AT, chain[2]] - b.places[AT, chain[0]] for b in (body, after))
+    turn = np.arccos(before @ now / np.linalg.norm(before) / np.linalg.norm(now))
+    assert turn <= MOST + 0.01

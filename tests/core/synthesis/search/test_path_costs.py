@@ -1,0 +1,78 @@
+"""What the path search weighs, on the made library: each misfit costs, and what fits is free."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from beyond_mocap.synthesis.search.offer import RATES, SLOT
+from beyond_mocap.synthesis.search.path_costs import PathCosts, Weights
+
+NORMAL = int(np.flatnonzero(RATES == 1.0)[0])
+NONE = Weights(**{name: 0.0 for name in vars(Weights())})
+
+
+def frames_of(library, path, mirrored=False):
+    clip = next(i for i, c in enumerate(library.clips) if c.path == path and c.mirrored == mirrored)
+    first = library.frames.first[clip]
+    return np.arange(first, first + library.frames.count[clip] - SLOT - 2)
+
+
+def costs(library, asked, **weights):
+    return PathCosts(library, asked, replace(NONE, **weights))
+
+
+def misfit(found, frames):
+    return found.misfit(60, 60 + SLOT, np.full(len(frames), NORMAL), frames)
+
+
+@pytest.mark.parametrize("path, speed", [("stand.bvh", 0.0), ("walk.bvh", 1.4), ("jog.bvh", 2.8), ("run.bvh", 5.0)])
+def test_speed_costs_what_it_is_off(library, order, track_of, path, speed):
+    frames = frames_of(library, path)
+    missed = misfit(costs(library, order(track=track_of(1.4)), speed=1.0), frames)
+    assert np.median(missed) == pytest.approx(abs(speed - 1.4), abs=0.15)
+
+
+def test_whoever_stands_on_both_feet_is_dragged(library, order, track_of):
+    found = costs(library, order(track=track_of(0.6)), drag=1.0)
+    assert misfit(found, frames_of(library, "stand.bvh")).min() > 0.5
+    assert misfit(found, frames_of(library, "walk.bvh")).max() < 0.3
+
+
+def test_a_bow_to_the_other_side_costs(library, order, track_of):
+    found = costs(library, order(track=track_of(1.4, turn=0.9)), turn=1.0)
+    left, right = (
+        np.median(misfit(found, frames_of(library, "bows/turn.bvh", mirrored))) for mirrored in (False, True)
+    )
+    assert left < 0.1 and right > 0.3
+
+
+def test_words_that_lack_and_actions_that_nobody_asked_for_cost(library, order):
+    asked = order((0.0, 8.0, "jogging"))
+    lacking = costs(library, asked, words=1.0)
+    assert np.all(misfit(lacking, frames_of(library, "walk.bvh")) == 1.0)
+    assert not np.any(misfit(lacking, frames_of(library, "jog.bvh")))
+    kick = next(key for key in library.keys if not library.clips[key.clip].mirrored)
+    at = library.frames.first[kick.clip] + int(kick.frame * 30.0 / library.clips[kick.clip].motion.fps)
+    unasked = misfit(costs(library, asked, unasked=1.0), np.array([at - SLOT, at]))
+    assert np.all(unasked == 1.0)
+
+
+def test_a_cut_costs_what_the_standing_foot_would_jump(library, order):
+    frames = frames_of(library, "walk.bvh")
+    stands = library.feet_standing[frames]
+    one = frames[stands[:, 0] & ~stands[:, 1]]
+    found = costs(library, order()).feet_apart(one[:, None], one)
+    feet = library.frames.feet[one, :2]
+    assert np.allclose(found, np.linalg.norm(feet[:, None] - feet, axis=-1), atol=1e-6)
+    other = frames[~stands[:, 0] & stands[:, 1]]
+    assert not np.any(costs(library, order()).feet_apart(one[:, None], other))
+
+
+def test_the_cheapest_are_the_cheapest(library, order, track_of):
+    found = PathCosts(library, order(track=track_of(1.4)))
+    number, frame, cost = found.cheapest(60, 68, 10**6, 20)
+    every = np.indices(found.offer.speed.shape).reshape(2, -1)
+    whole = np.sort(found.misfit(60, 68, *every))
+    assert np.allclose(np.sort(cost), whole[:20], atol=1e-5)
+    assert np.allclose(cost, found.misfit(60, 68, number, frame), atol=1e-5)
