@@ -25,7 +25,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import quintic_step
+from ..motion.retargeting import adult
 
+LEG = adult.LEG
 GRAVITY = 9.81  # m/s^2
 FASTEST = 9.5  # m/s, the tables' last speed
 # walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)

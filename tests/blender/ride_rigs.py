@@ -3,7 +3,7 @@ motion."""
 
 import bpy
 import numpy as np
-import rigs
+import sample_rigs as rigs
 from mathutils import Vector
 
 START, FRAMES = 5, 60

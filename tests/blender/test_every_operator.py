@@ -19,7 +19,7 @@ import bpy
 import numpy as np
 import pytest
 import remembered
-import rigs
+import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
 from throw_models import model_file

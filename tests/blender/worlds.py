@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-import rigs
+import sample_rigs as rigs
 from conftest import EXTENSION
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[2] / "sample_blend" / "library"

@@ -3,7 +3,7 @@
 import bpy
 import numpy as np
 import pytest
-import rigs
+import sample_rigs as rigs
 from test_match_scene import FPS, START, room, scenery, shown, walk  # noqa: F401  (fixtures)
 
 READERS = {

@@ -6,7 +6,7 @@ import importlib
 import bpy
 import numpy as np
 import pytest
-import rigs
+import sample_rigs as rigs
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
 from test_result import look, one, poses  # noqa: F401
 from test_ride import choose, walker

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 import ride_rigs
-import rigs
+import sample_rigs as rigs
 from test_ride import SAMPLE, bits, choose
 from test_rigs import rigify  # noqa: F401  (a fixture)
 from undo import assert_one_step

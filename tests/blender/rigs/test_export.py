@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import bpy
 import numpy as np
 import pytest
-import rigs
+import sample_rigs as rigs
 from undo import state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"

@@ -11,7 +11,7 @@ import sys
 import bpy
 import numpy as np
 import pytest
-import rigs
+import sample_rigs as rigs
 from undo import assert_one_step, press, state
 
 SAMPLE = pathlib.Path(__file__).resolve().parents[3] / "sample_blend" / "library"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import remembered
 import ride_rigs
-import rigs
+import sample_rigs as rigs
 import worlds
 from conftest import EXTENSION
 from throw_models import model_file

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beyond_mocap.base.easing import quintic_between
 from beyond_mocap.passes.orders import HitOrder, Stance
-from beyond_mocap.passes.way import SPEEDING, hermite, needed, placed, walked, way
+from beyond_mocap.passes.way import SPEEDING, needed, placed, walked, way
 from beyond_mocap.motion import quaternion
 
 STILL = np.zeros(2)
@@ -65,13 +66,13 @@ def test_who_has_time_stands_where_he_sets_out():
 def test_who_has_none_goes_straight_over():
     before, after = (0.0, np.zeros(2), STILL), (0.5, np.array([0.4, 0.0]), STILL)
     times = np.linspace(0.0, 0.5, 11)
-    np.testing.assert_allclose(walked(times, before, after), hermite(times, before, after))
+    np.testing.assert_allclose(walked(times, before, after), quintic_between(times, before, after))
 
 
 def test_hermite_meets_places_and_velocities():
     ends = (1.0, np.array([0.0, 1.0]), np.array([1.0, 0.0])), (2.5, np.array([2.0, -1.0]), np.array([0.0, -2.0]))
     step = 1e-5
     for time, place, velocity in ends:
-        near = hermite(np.array([time - step, time, time + step]), *ends)
+        near = quintic_between(np.array([time - step, time, time + step]), *ends)
         np.testing.assert_allclose(near[1], place, atol=1e-12)
         np.testing.assert_allclose((near[2] - near[0]) / (2 * step), velocity, atol=1e-6)
