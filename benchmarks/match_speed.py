@@ -14,10 +14,12 @@ from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
 from beyond_mocap.motion.track import clean, sample
 from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.balance import balanced
 from beyond_mocap.synthesis.search.path_search import PathSearch
-from beyond_mocap.synthesis.search.wanted import wanted
-from beyond_mocap.synthesis.synthesize import synthesize, with_made_gaits
+from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.search_library import search_library
+from beyond_mocap.synthesis.synthesize import synthesize
 
 from benchmarks.effort import seconds
 from benchmarks.markdown import head, row
@@ -39,8 +41,9 @@ def window_row(library: Library, match: Match, player: str, start: float) -> str
     """One player over one window: the search alone, and everything, per 20 s."""
     track, _ = clean(match.track(player, start, start + WINDOW))
     plan = Plan(track=track, nearest=True)
-    known = with_made_gaits(library, plan, lambda fraction, text: None)
-    order, weights = wanted(known, plan), balanced(plan.alpha)
+    resolved = resolve_plan(plan, library)
+    known = search_library(library, resolved)
+    order, weights = build_order(known, resolved), balanced(plan.alpha)
     searched, _ = seconds(lambda: PathSearch(known, order, weights).run())
     whole, take = seconds(lambda: synthesize(library, plan))
     share = 20.0 / (track.times[-1] - track.times[0])
