@@ -5,7 +5,7 @@ import re
 import sys
 
 TOP = pathlib.Path(__file__).resolve().parent.parent
-PAGE = TOP / "docs" / "match-input.md"
+PAGE = TOP / "docs" / "match" / "match-input.md"
 
 
 def with_tables(text):

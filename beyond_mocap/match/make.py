@@ -222,7 +222,7 @@ def _close(job: stages.Job, crowd) -> None:
     made = len(state.players) - len(state.failed)
     state.tell(status="failed" if not made else "partial" if state.failed else "done")
     if job.order.figures:
-        from .report import page
+        from .report.page import page
 
         path = job.folder.path
         atomic_write(path / "report.html", page(path, thumbnails(job.library, path)))

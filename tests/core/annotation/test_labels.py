@@ -17,13 +17,13 @@ TOP = pathlib.Path(__file__).parents[3]
 TOE_POKE = "toe_poke,toe poke,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
-    *(f"beyond_mocap/motion/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
+    *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
     "beyond_mocap/synthetic/ground_truth/planted.py", "beyond_mocap/library/made.py", "beyond_mocap/throws/planted_examples.py",
 }  # fmt: skip
 ALLOWED = {
     "beyond_mocap/passes/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
     "beyond_mocap/library/landings.py": "is about getting up",
-    "beyond_mocap/files/events/events.py": "providers' kinds of events",
+    "beyond_mocap/files/events/event_tables.py": "providers' kinds of events",
     "beyond_mocap/match/pieces/pool.py": "a cluster that is running",
     "beyond_mocap/library/one_skeleton.py": "arguments by name",
 }
@@ -87,7 +87,7 @@ def test_a_new_label_is_one_row(tmp_path):
 
 USES = """
 import beyond_mocap
-from beyond_mocap import known_touches
+from beyond_mocap.synthesis import known_touches
 from beyond_mocap.annotation import DISCRETE, KeyMoment, Timeline, parse_timeline, spoken, validate, words_below
 from beyond_mocap.annotation.ball_contact import may_use_foot, surfaces
 from beyond_mocap.annotation.decision import Walk, choose, options

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import pytest
 
+from beyond_mocap.synthesis.provenance import write_provenance
 from beyond_mocap import __main__ as command
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
@@ -17,7 +18,6 @@ from beyond_mocap.evaluation.html import html_report, worst_frames
 from beyond_mocap.synthesis.quality.targets import KEY_TARGETS, TARGETS, Target, target_of
 from beyond_mocap.evaluation.view import View
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.files import tables
 from beyond_mocap.motion.motion import Motion
 
 pytest.importorskip("matplotlib")
@@ -166,7 +166,7 @@ def test_without_matplotlib_one_line_says_what_to_do(take, monkeypatch):
 def test_evaluate_writes_the_page(take, tmp_path, monkeypatch, capsys):
     motion, provenance, report, page = (tmp_path / name for name in ("m.bvh", "p.csv", "r.json", "r.html"))
     bvh.write(motion, take.motion)
-    tables.write_provenance(provenance, take)
+    write_provenance(provenance, take)
     options = ["evaluate", str(motion), "--provenance", str(provenance), "--report", str(report), "--html"]
     assert command.main([*options, str(page)]) == 0
     assert page.read_text(encoding="utf-8").startswith("<!DOCTYPE html>") and report.exists()

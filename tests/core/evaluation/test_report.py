@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beyond_mocap.synthesis.provenance import provenance_of, read_provenance, write_provenance
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.report import evaluate, evaluate_played, table
@@ -226,9 +227,9 @@ def test_files_score_as_the_take_in_memory(cut, track_of, still_ball, library, t
     take = cut(("jog.bvh", 150, 120), ("run.bvh", 40, 120), asked=(key,))
     take = replace(take, ball=still_ball(take, (3.0, 0.0, 0.11)))
     bvh.write(tmp_path / "m.bvh", take.motion)
-    tables.write_provenance(tmp_path / "p.csv", take)
+    write_provenance(tmp_path / "p.csv", take)
     tables.write_ball(tmp_path / "b.csv", take.ball)
-    motion, provenance = bvh.read(tmp_path / "m.bvh", 0.01).motion, tables.read_provenance(tmp_path / "p.csv")
+    motion, provenance = bvh.read(tmp_path / "m.bvh", 0.01).motion, read_provenance(tmp_path / "p.csv")
     played = played_from_tables(motion, provenance, tables.read_ball(tmp_path / "b.csv"))
     track = track_of(take)
     read = evaluate_played(played, track=track, timeline=take.timeline, library=library)
@@ -283,7 +284,7 @@ def test_a_standing_body_stays_still(cut, track_of, library):
 
 
 def test_wrong_provenance_and_wrong_skeleton_are_told(uncut, library):
-    provenance = tables.provenance_of(uncut)
+    provenance = provenance_of(uncut)
     with pytest.raises(InputError, match="300 rows"):
         played_from_tables(uncut.motion.frames(0, 10), provenance)
     offsets = uncut.motion.skeleton.offsets * np.linspace(1.0, 1.3, len(uncut.motion.skeleton))[:, None]

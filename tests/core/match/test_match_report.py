@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.report import page
+from beyond_mocap.match.report.page import page
 from beyond_mocap.match.report.results import read_match_results
 from beyond_mocap.match.report.worst import worst_seconds
 from beyond_mocap.match.report.strips import colours, heat_strip
