@@ -5,6 +5,8 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
+from ..overlays import store
+from . import window
 from .properties import with_settings
 
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
@@ -16,9 +18,6 @@ PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "
 
 def _changed(_settings, context):
     """Let what is missing be prepared and the views be drawn again."""
-    from . import window
-    from ..overlays import store
-
     if context.scene is not None and not bpy.app.background:
         store.sync(context.scene)
         window.redraw()
