@@ -6,8 +6,7 @@ import bpy
 
 from ..scene.ball.settings import aimed_ball
 from ..scene.passes import graph
-from ..scene.core.properties import active_row
-from ..scene.passes.settings import ball_of, subject, told_lines
+from ..scene.passes.settings import active_row, ball_of, subject, told_lines
 from .passes import passing
 from .stream import live, stream
 from .tab import Step, paragraph, section, split, table

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.core.properties import active_row
-from ..scene.passes.settings import told_lines
+from ..scene.passes.settings import active_row, told_lines
 from .tab import paragraph, section, split, table
 
 PART_ICONS = {
