@@ -15,7 +15,7 @@ from .properties import active_row, with_settings
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..timeline.video import BeyondMocapVideo, renew
-from .view_settings import BeyondMocapView
+from ..overlays.settings import BeyondMocapView
 from ..rigs.rig import BeyondMocapRig
 
 

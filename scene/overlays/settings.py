@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from ..overlays import store
-from . import window
-from .properties import with_settings
+from . import store
+from ..core import window
+from ..core.properties import with_settings
 
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 """The overlays, in the order in which they are drawn and listed."""
