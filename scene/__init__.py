@@ -18,8 +18,7 @@
                 `strip_lines` is what one of them says, `strip_events` puts in order what users do to them
 - `subject`     whose timeline is meant; `word_checks` what is wrong with it; `moment_names` drawn in the NLA editor
 - `migrate`   what earlier versions have saved
-- `view_settings`, `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the
-  file
+- `overlays`   what is drawn over the 3D view; `quality`, `error_curves` what a report says, in the file
 - `background`  long work in a thread; `queue`, `orders` which player is made next, and of what
 - `freshness`   what is out of date; `hand_keys` what of a result is the user's; `variants`, `stretch` other solutions
 - `rig`, `bone_maps`, `rig_bake`, `rig_copy`   a motion onto somebody's own rig, by a map of its bones; `rigs` what that

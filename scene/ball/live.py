@@ -75,4 +75,3 @@ def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 WATCHER = Watcher(
     name="Aimed balls", changed=look_at, follow=follow, restored=shots.unsure, loaded=shots.forget, ends=shots.forget,
 )
-mark = WATCHER.mark

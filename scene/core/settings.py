@@ -11,11 +11,11 @@ from bpy.props import (
     BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
 )
 
-from .properties import with_settings
+from .properties import active_row, with_settings
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..timeline.video import BeyondMocapVideo, renew
-from .view_settings import BeyondMocapView
+from ..overlays.settings import BeyondMocapView
 from ..rigs.rig import BeyondMocapRig
 
 
@@ -154,6 +154,4 @@ def as_setting(path: str) -> str:
 
 def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
     """The player chosen in the list; None while the list is empty."""
-    if 0 <= settings.active_player < len(settings.players):
-        return settings.players[settings.active_player]
-    return None
+    return active_row(settings.players, settings.active_player)

@@ -11,9 +11,8 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked
-from ..path_editing.carrier import carrier_of
 from ..core.live import Watcher
-from ..path_editing.rigs import rides_as_rig
+from ..path_editing.rigs import carrier_of, rides_as_rig
 from . import graph
 
 if TYPE_CHECKING:

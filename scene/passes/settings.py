@@ -9,7 +9,8 @@ from bpy.props import (
     BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
 )
 
-from ..core.properties import with_settings
+from ..core import live
+from ..core.properties import active_row, with_settings
 from ..result.result import BeyondMocapBefore
 
 SAMPLES = (
@@ -25,9 +26,7 @@ KEPT = "beyond_mocap_scene_ball"  # custom property of balls and actions made he
 
 def touch_live(_settings, _context) -> None:
     """A change that a solved scene may have to follow."""
-    from . import live
-
-    live.mark()
+    live.mark("Passing scene")
 
 
 def renamed(player, context) -> None:
@@ -174,11 +173,6 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     touches: CollectionProperty(type=BeyondMocapTouch, description="Touches that were solved from tracking")
     active_touch: IntProperty(name="Touch", min=0, description="The touch that is picked in the list")
     solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Lines about the ball that was solved")
-
-
-def active_row(rows, number: int):
-    """The row of a list that is picked; None while the list is empty."""
-    return rows[number] if 0 <= number < len(rows) else None
 
 
 def subject(context: bpy.types.Context) -> bpy.types.Object | None:

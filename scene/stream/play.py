@@ -226,4 +226,4 @@ def _after_undo() -> None:
         _over("Undo has ended Play Live: press it to begin anew")
 
 
-WATCHER = Watcher(name="Play Live", restored=_after_undo, ends=stop)
+WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop, ends=stop)

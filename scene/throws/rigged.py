@@ -11,8 +11,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..rigs import bone_maps, rig_bake
 from ..core import channels
-from ..path_editing.carrier import carrier_of
-from ..path_editing.rigs import is_plain
+from ..path_editing.rigs import carrier_of, is_plain
 from ..rigs import bake_record
 from ..rigs.driven import Driven, check
 from ..rigs.fit import BakeOptions

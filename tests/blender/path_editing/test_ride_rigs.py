@@ -52,7 +52,7 @@ def ride(part, core):
     def go(rig, bent, **settings):
         scene, recipe = bpy.context.scene, core("path_editing.ride")
         wanted = recipe.RideSettings(**settings)
-        carrier = part("path_editing.carrier").carrier_of(rig)
+        carrier = part("path_editing.rigs").carrier_of(rig)
         carrier.check()
         read = carrier.read(scene)
         source = recipe.prepare(read.motion, wanted, read.standing)
@@ -203,7 +203,7 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
     rig = kind(recorded, part, rigify)
     bpy.context.view_layer.update()
     before = whole(part, rig)
-    carrier = part("path_editing.carrier").carrier_of(rig)
+    carrier = part("path_editing.rigs").carrier_of(rig)
     assert type(carrier).__name__ == "RigCarrier"
     seen = carrier.read(bpy.context.scene)
     assert whole(part, rig) == before  # looking changes nothing
