@@ -319,7 +319,7 @@ class BEYOND_MOCAP_OT_solve_ball(BackgroundVerb, bpy.types.Operator):
     """Work out of the imported tracking who touches the ball and when, and its way between. The ball becomes an object,
 its touches proposals for key moments"""
 
-    bl_idname = "beyond_mocap.ball.solve_ball"
+    bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
     kind = "ball"
 

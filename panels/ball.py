@@ -48,7 +48,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
 def tracked(panel, layout, context) -> None:
     """The button, what was solved, and the touches."""
     settings = context.scene.beyond_mocap_passes
-    layout.operator("beyond_mocap.ball.solve_ball", icon="SPHERE")
+    layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
     panel.progress(context, "ball")
     if settings.solved:
         table(layout, settings.solved.splitlines())

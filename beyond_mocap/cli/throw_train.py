@@ -39,7 +39,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 def _require_training() -> None:
     """InputError, one line, where jax, optax or the project's `training` folder is missing: in Blender, say."""
-    core = __name__.partition(".commands.")[0]
+    core = __name__.partition(".cli.")[0]
     try:
         if core != "beyond_mocap":  # inside Blender the core has another name, and training knows it by this one
             raise ImportError

@@ -40,7 +40,7 @@ def drawn():
     area = window.area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     look_down(area)
-    run("beyond_mocap.synthesis.synthesize")
+    run("beyond_mocap.synthesize")
     yield from settled()
     yield from until(lambda: player().take)
 
