@@ -8,13 +8,14 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training quick test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
   pictures clean
 
 help:
 	@echo 'make venv           .venv with Blender as a Python module and all that the tests need'
 	@echo 'make training       .venv-training with what trains the networks of throws and kicks (jax, no Blender)'
 	@echo 'make quick ROOM=... the tests of one room (ROOM=path_editing), in about a minute'
+	@echo 'make lint           ruff over all source, mypy over the core'
 	@echo 'make test           all tests but the window ones: the core, training, then Blender 5.0 (or 5.2) and Blender 4.5'
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
@@ -52,6 +53,11 @@ test: venv venv-oldest training
 ROOM_OF = $(wildcard tests/$(1)/$(ROOM) tests/$(1)/*/$(ROOM) tests/$(1)/test_$(ROOM).py tests/$(1)/test_$(ROOM)_*.py)
 ROOMS = $(sort $(filter-out __pycache__,$(notdir $(patsubst %/,%,$(wildcard tests/core/*/ tests/blender/*/))) \
   $(patsubst test_%.py,%,$(notdir $(wildcard tests/core/test_*.py tests/blender/test_*.py)))))
+lint: venv
+	@packaging/venv.sh lint
+	.venv-lint/bin/ruff check .
+	.venv-lint/bin/mypy --python-executable .venv/bin/python
+
 quick: export OPENBLAS_NUM_THREADS = 1
 quick: export OMP_NUM_THREADS = 1
 quick: venv
@@ -109,4 +115,4 @@ pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py
 
 clean:
-	rm -rf build .venv .venv-4.5 .venv-training
+	rm -rf build .venv .venv-4.5 .venv-training .venv-lint

@@ -11,7 +11,7 @@ _registered = []
 
 def run(arguments: list[str]) -> int:
     """Run one command line; returns its exit status."""
-    from ..beyond_mocap.__main__ import main
+    from ..beyond_mocap.cli.main import main
     from ..scene.rigs.deliver import WRITERS
     from ..scene.match import child
 

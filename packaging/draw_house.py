@@ -37,9 +37,10 @@ def draw_house() -> str:
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {right} {bottom}" font-family="sans-serif">'
         '<defs><marker id="tip" markerWidth="9" markerHeight="7" refX="8" refY="3.5" orient="auto">'
-        f'<path d="M0,0 L9,3.5 L0,7 z" fill="#667"/></marker></defs><rect width="{right}" height="{bottom}" fill="#fff"/>'
+        '<path d="M0,0 L9,3.5 L0,7 z" fill="#667"/></marker></defs>'
+        f'<rect width="{right}" height="{bottom}" fill="#fff"/>'
         f'<rect x="12" y="{_TOP - 30}" width="{right - 24}" height="{bottom - _TOP + 18}" rx="10" fill="#f7f8fa" '
-        f'stroke="#ccd"/><text x="24" y="{_TOP - 12}" font-size="13" fill="#445">{CORE}/: the core, without Blender</text>'
+        f'stroke="#ccd"/><text x="24" y="{_TOP - 12}" font-size="13" fill="#445">{CORE}/, without Blender</text>'
     )
     return "\n".join([head, *_draw_blender(), *arrows, *boxes, "</svg>", ""])
 
@@ -70,7 +71,8 @@ def _reduced() -> dict[str, set[str]]:
     def reach(room: str) -> set[str]:
         return graph[room].union(*(reach(other) for other in graph[room]))
 
-    return {room: {o for o in others if not any(o in reach(p) for p in others if p != o)} for room, others in graph.items()}
+    follows = {room: set().union(*map(reach, others)) for room, others in graph.items()}
+    return {room: others - follows[room] for room, others in graph.items()}
 
 
 def _route(room: str, other: str) -> list[tuple[float, float]]:

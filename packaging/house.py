@@ -148,13 +148,13 @@ def find_circles(graph: dict) -> list[list]:
 
 
 def room_graph() -> dict[str, set[str]]:
-    """For each room of the core the rooms that it imports."""
+    """For each room of the core the rooms that it imports; ground truth is left out."""
     graph: dict[str, set[str]] = {room: set() for rooms in LAYERS for room in rooms}
     for path, others in file_graph().items():
-        if path.parts[0] != CORE or len(path.parts) < 3:
-            continue
-        graph[path.parts[1]] |= {o.parts[1] for o in others if o.parts[0] == CORE and len(o.parts) > 2}
-    return {room: others - {room} for room, others in graph.items()}
+        room, *below = (room_of(".".join(one.with_suffix("").parts)) for one in (path, *others))
+        if path.parts[0] == CORE and room in graph:
+            graph[room] |= {other for other in below if other in graph} - {room}
+    return graph
 
 
 def count_side_by_side(*folders: str) -> Iterator[tuple[str, int]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..scene.path_editing.figure_lines import lines
+from .figure_lines import lines
 from ..scene.path_editing.settings import meant
 from ..scene.core.settings import active_player
 from .tab import Step, figures, paragraph, section, split

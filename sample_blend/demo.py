@@ -229,7 +229,7 @@ def run(out: pathlib.Path) -> None:
     load, switch_off = load_extension()
     import bpy
 
-    told = load("beyond_mocap.__main__").Told(False)
+    told = load("beyond_mocap.cli.main").Told(False)
     steps = Steps(
         told, {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Accept": 0.03, "Render": 0.65, "Save": 0.02}
     )

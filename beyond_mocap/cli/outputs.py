@@ -54,3 +54,8 @@ def named_folder(text: str) -> Path:
     if not text.strip():
         raise argparse.ArgumentTypeError("no folder is named")
     return Path(text)
+
+
+def add_take_files(verb) -> None:
+    verb.add_argument("--provenance", type=Path, metavar="P.csv")
+    verb.add_argument("--ball", type=Path, metavar="B.csv")

@@ -267,8 +267,8 @@ def _shown_all_the_same(take: Take) -> list[str]:
     told = []
     for word in sorted(frozenset().union(*avoided)):
         shows = np.array([word in avoid and word in words for avoid, words in zip(avoided, take.words)])
-        for time, words in asked:
-            shows &= (word not in words) | (np.abs(times - time) > NEAR_KEY)
+        for moment, words in asked:
+            shows &= (word not in words) | (np.abs(times - moment) > NEAR_KEY)
         told += [
             TimedLine(
                 f"{times[first]:.1f} s: '{word}' is shown for {(end - first) / take.motion.fps:.1f} s though it "

@@ -142,14 +142,14 @@ def _told_of(path: Path, action: Action, words: Annotations, rows: list[_Known] 
 
 def _tell_strangers(words: Annotations, action: Action, folder: Path, told: Callable[[str], None]) -> None:
     """A line for each table of annotations below the folder that tells of recordings which are not there."""
-    for place, rows in words.tables.items():
-        if place != folder.absolute() and folder.absolute() not in place.parents:
+    for table, rows in words.tables.items():
+        if table != folder.absolute() and folder.absolute() not in table.parents:
             continue  # of a larger library, which may have others
         named = [name for name, its in rows.items() if any(action.words & set(one.words) for one in its)]
-        missing = [name for name in named if not (place / name).is_file()]
+        missing = [name for name in named if not (table / name).is_file()]
         if missing:
             told(
-                f"{place / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}"
+                f"{table / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}"
             )
 
 

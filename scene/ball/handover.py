@@ -70,15 +70,24 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     for name in ("handed", "handed_before"):
         aim.property_unset(name)
     heir = next((thing for thing in scene.objects if thing.beyond_mocap_aim.handed), None)
-    if heir is not None:  # what came before the first handover is brought back after the last
-        theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
-        if not kept.get("others"):
-            theirs.update(
-                {name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False
-            )
-        theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
-        heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
+    if heir is not None:
+        _bequeath(heir, kept)
         return
+    _remove_solids(scene, kept)
+    _restore_world(scene, kept)
+
+
+def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
+    """Let another ball that is handed over bring back what came before the first handover, after the last."""
+    theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
+    if not kept.get("others"):
+        theirs.update({name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False)
+    theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
+    heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
+
+
+def _remove_solids(scene: bpy.types.Scene, kept: dict) -> None:
+    """Objects that were made solid are no rigid bodies any more; the ground that was added goes."""
     for name in kept.get("solid", ()):
         thing = scene.objects.get(name)
         if thing is not None and thing.rigid_body is not None and thing.visible_get():
@@ -88,6 +97,10 @@ def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
         mesh = slab.data
         bpy.data.objects.remove(slab)
         bpy.data.meshes.remove(mesh)
+
+
+def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
+    """The rigid-body world is as it was before, or gone where there was none."""
     world = scene.rigidbody_world
     if world is not None and not kept.get("world", True):
         with bpy.context.temp_override(scene=scene):

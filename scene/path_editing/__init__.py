@@ -8,7 +8,7 @@
 - `source`    the original motion relative to its own path, kept while a path is dragged; the ground
 - `riders`    a ride begun, brought up to date, kept or ended
 - `live`      sees that something has been edited, and brings riders up to date
-- `measure`   a rider's figures, in a thread once it is at rest; `figure_lines` as the panel says them
+- `measure`   a rider's figures, in a thread once it is at rest
 - `bystanders` are the other bodies of a scene, of which riders keep clear
 - `keep_apart` finds who would run into whom, and asks them to wait or go round
 """

@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 
 
 def test_jax_is_there_and_blender_is_not():

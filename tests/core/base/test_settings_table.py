@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from settings_page import PAGE, settings_page
 
-from beyond_mocap.__main__ import parser
+from beyond_mocap.cli.main import parser
 from beyond_mocap.ball.physics import THROWN
 from beyond_mocap.base import settings
 from beyond_mocap.base.settings import TABLES, setting

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import _interrupts, main
+from beyond_mocap.cli.main import _interrupts, main
 from beyond_mocap.annotation import read_timeline
 from beyond_mocap.cli.progress_reporter import Told
 from beyond_mocap.files.bvh import bvh

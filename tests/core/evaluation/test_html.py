@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from beyond_mocap.synthesis.provenance import write_provenance
-from beyond_mocap import __main__ as command
+from beyond_mocap.cli import main as command
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.evaluation.report import evaluate, evaluate_played

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from provider_tables import PAGE, with_tables
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking import tracking
 from beyond_mocap.files.tracking.feed import TrackingProvider

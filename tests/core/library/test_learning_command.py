@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.annotation import read_annotation_csv
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"

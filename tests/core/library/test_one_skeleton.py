@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.one_skeleton import bring, bring_one
 from beyond_mocap.library.repair import slide

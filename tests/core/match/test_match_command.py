@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.cli.matching import without
 from beyond_mocap.match.folder import read_state
 from tests.core.match.small_match import LIBRARY, SMALL

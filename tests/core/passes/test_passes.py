@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.passes.links import BONES, BoneWeights
 from beyond_mocap.passes.pass_scene import Weights

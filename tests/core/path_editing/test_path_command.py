@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.cli.progress_reporter import Told
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.synthesis.provenance import read_provenance

@@ -100,7 +100,7 @@ def test_the_same_order_gives_the_same_bits(take_of, method):
 
 REMOTE = """
 import sys, hashlib, numpy as np
-from beyond_mocap.library.library import build
+from beyond_mocap.library.build import build
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import METHODS, Plan

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.annotation import read_clip_annotations
 from beyond_mocap.ball.physics import BASEBALL
 from beyond_mocap.ball.wall import meets_wall

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.ball.flight import fly
 from beyond_mocap.ball.impact import crossing
 from beyond_mocap.throws.letting_go import InHand, grip_point

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.throws.planted_examples import write_planted
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.__main__ import main
+from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc_write import write_trc

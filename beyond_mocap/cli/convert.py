@@ -1,0 +1,71 @@
+"""The verbs `mirror` and `retarget`."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from pathlib import Path
+
+from ..base.errors import InputError
+from ..base.settings.options import add_options
+from .outputs import Writer, check_outputs
+from .progress_reporter import Told
+
+
+def add_mirror(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("mirror", help="left becomes right")
+    verb.add_argument("input", type=Path, metavar="IN.bvh")
+    verb.add_argument("output", type=Path, metavar="OUT.bvh")
+    add_options(verb, "mirror")
+    verb.set_defaults(run=run_mirror)
+    return verb
+
+
+def add_retarget(verbs) -> argparse.ArgumentParser:
+    verb = verbs.add_parser("retarget", help="the same motion on other bones")
+    verb.add_argument("input", type=Path, metavar="IN.bvh")
+    verb.add_argument("--to", type=Path, required=True, metavar="SKELETON.bvh", help="a recording or a pose of it")
+    verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
+    verb.add_argument("--map", type=Path, metavar="M.json", help="a JSON object, joint of IN -> joint of SKELETON")
+    add_options(verb, "retarget")
+    verb.set_defaults(run=run_retarget)
+    return verb
+
+
+def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`mirror`: the same file with left and right exchanged."""
+    from ..files.bvh import bvh
+    from ..motion.mirror import mirror
+
+    check_outputs(options.output)
+    clip = bvh.read(options.input, options.unit)
+    try:
+        twin = mirror(clip.motion)
+    except InputError as error:  # about a skeleton, which does not know its file
+        raise InputError(options.input, str(error)) from None
+    bvh.write(options.output, twin, clip.form)
+    told.end()
+    for note in clip.notes:
+        told.note(note)
+    print(f"{options.output}: {len(clip.motion)} frames")
+
+
+def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`retarget`: the motion on another skeleton, whose joint names and channels the output has; at its own rate."""
+    from ..files.bvh import bvh
+    from ..library.one_skeleton import bring_one
+
+    check_outputs(options.out, never=(options.input, options.to, options.map))
+    clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
+    try:
+        motion = bring_one(clip.motion, target.motion, options.map)
+    except InputError as error:
+        if error.where != "skeleton":
+            raise
+        raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know their files
+    notes = bvh.write(options.out, motion, target.form)
+    told.end()
+    told_of = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
+    for path, note in told_of:
+        told.note(f"{path}: {note}")
+    print(f"{options.out}: {len(motion)} frames")
