@@ -3,85 +3,114 @@
     python packaging/draw_house.py            write the picture
     python packaging/draw_house.py --check    exit with 1 where the picture is out of date
 
-Layers stand as in `house.LAYERS`, the ground at the bottom. An arrow means "imports"; an arrow that follows from others
+Rooms stand as in `house.LAYERS`, the ground at the bottom. An arrow means "imports"; an arrow that follows from others
 is left out (transitive reduction), or the picture would be black.
 """
 
 from __future__ import annotations
 
 import ast
+import re
 import sys
+import textwrap
 from xml.sax.saxutils import escape
 
-from house import CORE, LAYERS, TOP, room_graph
+from house import CORE, LAYERS, TOP, layer_of, room_graph
 
 PICTURE = TOP / "docs" / "pictures" / "architecture.svg"
-_WIDTH, _BOX, _TALL, _GAP, _MARGIN = 1180, 196, 54, 34, 20
-_BLENDER = (("scene/", "Blender data"), ("operators/", "what buttons do"), ("panels/", "what is shown"))
+COLUMNS = {
+    "annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,
+    "evaluation": 3, "path_editing": 0, "passes": 1, "throws": 2, "markers": 3, "study": 4, "match": 5,
+}  # fmt: skip
+"""Where a room stands in its layer; rooms that are not named here go right across."""
+BLENDER = {"panels": "What is shown", "scene": "Data in Blender, the live watcher", "operators": "What buttons do"}
+_MARGIN, _STEP, _BOX, _RISE, _TALL = 36, 200, 180, 84, 56
+_ACROSS = 5 * _STEP + _BOX
+_TOP = _MARGIN + _RISE + 20
 
 
 def draw_house() -> str:
     """The picture as the text of an SVG file."""
-    places = _place_rooms()
-    arrows = [_draw_arrow(places[room], places[other]) for room, others in _reduced().items() for other in sorted(others)]
-    boxes = [_draw_box(place, room, _first_words(room)) for room, place in places.items()]
-    top = [
-        _draw_box((_MARGIN + number * (_BOX + 24), _MARGIN), name, text, "#fdebd0")
-        for number, (name, text) in enumerate(_BLENDER)
-    ]
-    height = _MARGIN * 2 + (len(LAYERS) + 1) * (_TALL + _GAP)
+    boxes = [_draw_box(*_corner(room), _first_words(room), room) for rooms in LAYERS for room in rooms]
+    arrows = [_draw_arrow(_route(room, other)) for room, others in _reduced().items() for other in sorted(others)]
+    right, bottom = _ACROSS + 2 * _MARGIN, _TOP + len(LAYERS) * _RISE + 20
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif">'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {right} {bottom}" font-family="sans-serif">'
         '<defs><marker id="tip" markerWidth="9" markerHeight="7" refX="8" refY="3.5" orient="auto">'
         '<path d="M0,0 L9,3.5 L0,7 z" fill="#667"/></marker></defs>'
-        f'<rect width="{_WIDTH}" height="{height}" fill="#fff"/>'
+        f'<rect width="{right}" height="{bottom}" fill="#fff"/>'
+        f'<rect x="12" y="{_TOP - 30}" width="{right - 24}" height="{bottom - _TOP + 18}" rx="10" fill="#f7f8fa" '
+        f'stroke="#ccd"/><text x="24" y="{_TOP - 12}" font-size="13" fill="#445">{CORE}/, without Blender</text>'
     )
-    return "\n".join([head, *arrows, *boxes, *top, "</svg>", ""])
+    return "\n".join([head, *_draw_blender(), *arrows, *boxes, "</svg>", ""])
 
 
-def _place_rooms() -> dict[str, tuple[float, float]]:
-    """Upper left corner of each room's box."""
-    places = {}
-    for height, rooms in enumerate(LAYERS):
-        y = _MARGIN + (len(LAYERS) - height) * (_TALL + _GAP)
-        left = 0.5 * (_WIDTH - len(rooms) * _BOX - (len(rooms) - 1) * 24)
-        for number, room in enumerate(rooms):
-            places[room] = (left + number * (_BOX + 24), y)
-    return places
+def _draw_blender() -> list[str]:
+    """What puts the core into Blender: a row of its own above the core."""
+    lefts = [_MARGIN + column * _STEP for column in (0, 2, 4)]
+    middle = _MARGIN + _TALL / 2 - 14
+    arrows = [
+        _draw_arrow([(lefts[0] + _BOX, middle), (lefts[1], middle)]),
+        _draw_arrow([(lefts[2], middle), (lefts[1] + _BOX, middle)]),
+        *(_draw_arrow([(left + _BOX / 2, middle), (left + _BOX / 2, _TOP - 30)]) for left in lefts[1:]),
+    ]
+    boxes = zip(lefts, BLENDER.items())
+    return arrows + [_draw_box(left, _MARGIN - 14, _BOX, text, name, "#fdebd0") for left, (name, text) in boxes]
+
+
+def _corner(room: str) -> tuple[float, float, float]:
+    """Left, top and width of a room's box."""
+    y = _TOP + (len(LAYERS) - 1 - layer_of(room)) * _RISE
+    return (_MARGIN + COLUMNS[room] * _STEP, y, _BOX) if room in COLUMNS else (_MARGIN, y, _ACROSS)
 
 
 def _reduced() -> dict[str, set[str]]:
-    """The rooms' imports without those that follow from others."""
-    graph = room_graph()
+    """The rooms' imports without those that follow from others; those of `synthetic.ground_truth` are left out too."""
+    graph = {room: {o for o in others if layer_of(o) < layer_of(room)} for room, others in room_graph().items()}
 
     def reach(room: str) -> set[str]:
         return graph[room].union(*(reach(other) for other in graph[room]))
 
-    return {room: {o for o in others if not any(o in reach(p) for p in others if p != o)} for room, others in graph.items()}
+    follows = {room: set().union(*map(reach, others)) for room, others in graph.items()}
+    return {room: others - follows[room] for room, others in graph.items()}
+
+
+def _route(room: str, other: str) -> list[tuple[float, float]]:
+    """The corners of an arrow: straight down, or down and aside, or aside and down where a box stands below."""
+    (left, top, wide), (to_left, to_top, to_wide) = _corner(room), _corner(other)
+    start, end = left + wide / 2, to_left + to_wide / 2
+    if room not in COLUMNS or other not in COLUMNS or start == end:
+        x = end if room not in COLUMNS else start
+        return [(x, top + _TALL), (x, to_top)]
+    below = [r for r in COLUMNS if COLUMNS[r] == COLUMNS[room] and layer_of(other) <= layer_of(r) < layer_of(room)]
+    if below:
+        y = top + 0.75 * _TALL
+        return [(left if end < start else left + wide, y), (end, y), (end, to_top)]
+    y = to_top + 0.35 * _TALL
+    return [(start, top + _TALL), (start, y), (to_left + to_wide if end < start else to_left, y)]
 
 
 def _first_words(room: str) -> str:
     """What the room's own docstring begins with."""
     text = ast.get_docstring(ast.parse((TOP / CORE / room / "__init__.py").read_text("utf-8"))) or ""
-    return text.split("\n")[0].split(":")[0].split(".")[0].split(";")[0]
+    return re.split(r"[.:;(]", text.split("\n")[0])[0].strip()
 
 
-def _draw_box(place: tuple[float, float], name: str, text: str, colour: str = "#e8eef7") -> str:
-    x, y = place
-    words = text if len(text) <= 34 else text[: text.rfind(" ", 0, 33)] + " …"
+def _draw_box(x: float, y: float, wide: float, text: str, name: str, colour: str = "#e8eef7") -> str:
+    lines = textwrap.wrap(text, wide // 6)[:2]
+    middle = x + wide / 2
     return (
-        f'<rect x="{x:g}" y="{y:g}" width="{_BOX}" height="{_TALL}" rx="6" fill="{colour}" stroke="#557"/>'
-        f'<text x="{x + _BOX / 2:g}" y="{y + 22:g}" text-anchor="middle" font-size="15">{escape(name)}</text>'
-        f'<text x="{x + _BOX / 2:g}" y="{y + 41:g}" text-anchor="middle" font-size="10.5" fill="#445">{escape(words)}</text>'
-    )
+        f'<rect x="{x:g}" y="{y:g}" width="{wide}" height="{_TALL}" rx="6" fill="{colour}" stroke="#557"/>'
+        f'<text x="{middle:g}" y="{y + 19:g}" text-anchor="middle" font-size="15">{escape(name)}</text>'
+    ) + "".join(
+        f'<text x="{middle:g}" y="{y + 35 + 13 * number:g}" text-anchor="middle" font-size="10.5" fill="#445">'
+        f"{escape(line)}</text>" for number, line in enumerate(lines)
+    )  # fmt: skip
 
 
-def _draw_arrow(above: tuple[float, float], below: tuple[float, float]) -> str:
-    start, end = (above[0] + _BOX / 2, above[1] + _TALL), (below[0] + _BOX / 2, below[1])
-    return (
-        f'<line x1="{start[0]:g}" y1="{start[1]:g}" x2="{end[0]:g}" y2="{end[1]:g}" stroke="#99a" '
-        'marker-end="url(#tip)"/>'
-    )
+def _draw_arrow(corners: list[tuple[float, float]]) -> str:
+    points = " ".join(f"{x:g},{y:g}" for x, y in corners)
+    return f'<polyline points="{points}" fill="none" stroke="#778" marker-end="url(#tip)"/>'
 
 
 if __name__ == "__main__":

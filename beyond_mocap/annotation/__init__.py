@@ -1,4 +1,4 @@
-"""The language between people, tracks and clips: a vocabulary, timelines of words, their text form, and gaits by speed.
+"""Labels with a time: vocabulary, timeline, text form, gaits by speed.
 
 - `labels`      what each label means, from one table (`vocabulary.csv`); `ball_contact` what that says of a ball met
 - `vocabulary`  the decision tree of words (Faustino, Appendix A), nearest words, left and right

@@ -1,1 +1,1 @@
-"""What a body looks like: a mesh for any skeleton, kit with shirt numbers, and a small picture drawn without Blender."""
+"""What a body looks like: a mesh for any skeleton, kit, a small picture without Blender."""

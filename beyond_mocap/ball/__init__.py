@@ -1,1 +1,1 @@
-"""The ball, the second actor: how it flies, bounces and rolls, and how it must leave to arrive where it is wanted."""
+"""How the ball flies, bounces and rolls; its path from tracking data."""

@@ -1,1 +1,1 @@
-"""The base: errors, small numerics and the settings table that every room uses."""
+"""Errors, small numerics and the table of settings, for every room."""

@@ -1,4 +1,4 @@
-"""What verbs of the command line share, and verbs with a file of their own.
+"""The command line: what its verbs share, and verbs with a file of their own.
 
 - `outputs`      where results may be written, and who writes them
 - `told`         progress, notes, Ctrl-C

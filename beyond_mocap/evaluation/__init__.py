@@ -1,4 +1,4 @@
-"""How good a take is: every figure of `../shared/metrics.md`, each beside what the recordings themselves score.
+"""Figures of a take beside the recordings' own; the report page.
 
 - `root`       on the track: root and pelvis error, sway, surge, speeds, what the library can play
 - `feet`       on the ground: skate on contacts, slide per stance, GMD's ratio, support, the lock's corrections

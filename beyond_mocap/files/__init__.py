@@ -1,2 +1,1 @@
-"""What enters or leaves by disk, converted once at the border: metres, seconds, Z up inside; each file's own form
-outside."""
+"""File formats that several features share: metres, seconds, Z up inside; each file's own form outside."""

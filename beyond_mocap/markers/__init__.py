@@ -1,1 +1,1 @@
-"""Optical markers: cleaned, put on a model of the body, and turned into motion (Fredriksson §3.4, §3.5, §5)."""
+"""Optical markers become the motion of a skeleton (Fredriksson §3.4, §3.5, §5)."""

@@ -1,4 +1,4 @@
-"""A whole match: from provider files to everybody's motion and the ball, in pieces that any number of processes make.
+"""A whole match in pieces, made by any number of processes.
 
 - `order`        what is asked; `folder` where it is made, by one run at a time; `state` what match.json says
 - `make`         the whole way; `stages` its parts

@@ -1,1 +1,1 @@
-"""What a movement is: quaternions, skeletons, motions, tracks, contacts and mirroring. Needs numpy and scipy only."""
+"""Skeletons, quaternions, motions, tracks, contacts, retargeting. Needs numpy and scipy only."""

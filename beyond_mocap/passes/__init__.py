@@ -1,1 +1,1 @@
-"""Players who keep a ball going: hits, pass planning, bodies, live scenes (Ball handling)."""
+"""Players who keep a ball going; motion streamed live (Ball handling)."""

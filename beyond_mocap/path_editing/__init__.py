@@ -1,1 +1,1 @@
-"""A recorded motion on another path (Path editing)."""
+"""A recorded motion on another path."""

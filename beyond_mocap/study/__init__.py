@@ -1,4 +1,4 @@
-"""A study of how natural motions look to people, so that Faustino §5.1 can be repeated by anyone.
+"""How natural motions look to people: a study with raters (Faustino §5.1).
 
 - `order`      clips under neutral names, and in which order each rater sees them
 - `study_file` the same as study.json, and the table of clips that it is made from

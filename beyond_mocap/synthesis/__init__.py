@@ -1,4 +1,4 @@
-"""How we choose: which stretch of which clip is played when.
+"""From a plan to a take: resolve, search, construct.
 
 `wanted` puts the order into frames of the library's rate, `annotation_cost` and `transition_cost` say what
 things cost, `blocks` finds the cheapest sequence and searches coarse to fine as Faustino §3.2 does,

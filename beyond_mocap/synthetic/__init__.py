@@ -1,1 +1,1 @@
-"""Parametric motion: gait, kicks, throws, gestures of synthetic performers."""
+"""Parametric gaits, kicks and throws; recordings with known answers."""

@@ -1,1 +1,1 @@
-"""Generated throws and kicks within longer motions."""
+"""Generated throws and kicks at a target."""
