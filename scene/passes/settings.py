@@ -9,9 +9,13 @@ from bpy.props import (
     BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
 )
 
+from ...beyond_mocap.base.digest import byte_digest
 from ..core import live
 from ..core.properties import active_row, with_settings
 from ..result.result import BeyondMocapBefore
+
+pictures: dict = {}
+"""The painted pictures of hit analyses: a preview collection under "graphs", while there are any."""
 
 SAMPLES = (
     ("three", "Three", "Three players, a triangle of passes"),
@@ -206,3 +210,14 @@ def told_lines(text: str) -> list[tuple[int, str]]:
 def found_of(hits: BeyondMocapHits) -> dict:
     """What a hit analysis found; empty where there was none."""
     return json.loads(hits.found or "{}")
+
+
+def picture_name(hits: BeyondMocapHits) -> str:
+    """The name of the picture of an analysis: another one for other curves."""
+    return byte_digest(hits.found, size=8).hex()
+
+
+def picture_icon(hits: BeyondMocapHits) -> int:
+    """The picture's number for a layout; 0 while it is not painted (`graph.paint`)."""
+    kept, name = pictures.get("graphs"), picture_name(hits)
+    return kept[name].icon_id if kept is not None and name in kept else 0

@@ -69,7 +69,7 @@ def choose(*names):
 def shown_hits(body):
     """Whether an armature's strikes are found and their graph is there."""
     hits = thing(body).beyond_mocap_hits
-    return hits.found and room("scene.passes.graph").icon_of(hits)
+    return hits.found and room("scene.passes.settings").picture_icon(hits)
 
 
 def check_hit_analysis_shows_a_graph_and_goes_to_strikes():
