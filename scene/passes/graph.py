@@ -37,7 +37,7 @@ def paint(hits: BeyondMocapHits) -> None:
 
 
 def picture(found: dict) -> np.ndarray:
-    """The picture (SIZE, SIZE, 4) float32, its lowest row first, of what `hitspictures.summary` says."""
+    """The picture (SIZE, SIZE, 4) float32, its lowest row first, of what `hits_shown.summary` says."""
     image = np.empty((SIZE, SIZE, 4), np.float32)
     image[..., :3], image[..., 3] = _GROUND, 1.0
     count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2
