@@ -97,8 +97,8 @@ def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckF
     taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
     velocity = (after - before).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
     back = quaternion.about_up(-heading)
-    own = [quaternion.rotate(back, line - root * [1.0, 1.0, 0.0]) for line in lines]
-    return StruckFrom(*own, surface.radius, quaternion.rotate(back, velocity))
+    start, end = (quaternion.rotate(back, line - root * [1.0, 1.0, 0.0]) for line in lines)
+    return StruckFrom(start, end, surface.radius, quaternion.rotate(back, velocity))
 
 
 def _lines(motion: Motion, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -189,7 +189,7 @@ class _Player:
         """The library's."""
         return self.library.skeleton
 
-    def place(self, at: float) -> tuple[float, float]:
+    def place(self, at: float) -> tuple[float, ...]:
         """(2,) m: where the track is at that second."""
         import numpy as np
 

@@ -56,7 +56,7 @@ def legend(view: View) -> dict[int, tuple[int, str]]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    table = [to_hex(c) for c in (*colormaps["Set2"].colors, *colormaps["Pastel1"].colors, *colormaps["Set3"].colors)]
+    table = [to_hex(c) for name in ("Set2", "Pastel1", "Set3") for c in getattr(colormaps[name], "colors")]
     used, counts = np.unique(view.played.clip[view.played.clip >= 0], return_counts=True)
     order = used[np.argsort(-counts, kind="stable")]
     return {int(clip): (place + 1, table[place % len(table)]) for place, clip in enumerate(order)}

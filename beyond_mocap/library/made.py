@@ -151,7 +151,8 @@ def runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
         return GaitStyle()
     rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
     shown = [at_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
-    recorded = Motion(example.skeleton, *(np.concatenate(column) for column in zip(*shown)), 30.0)
+    root, rotations = (np.concatenate(column) for column in zip(*shown))
+    recorded = Motion(example.skeleton, root, rotations, 30.0)
     made = gait(min(float(frames.speed[rows].mean()), FASTEST), 1.5, 30.0, example.skeleton, example=example)
     elbow, lean = np.clip(_elbow_and_lean(recorded) - _elbow_and_lean(made), -_STYLE, _STYLE)
     return GaitStyle(elbow=float(elbow), lean=float(lean))

@@ -174,7 +174,11 @@ class _Road:
         """The progress of a part of the way, from 0 to 1, as that of the whole."""
         if self._progress is None:
             return None
-        return lambda fraction, text="": self._progress(low + (high - low) * fraction, text)
+
+        def report(fraction: float, text: str = "") -> None:
+            self._progress(low + (high - low) * fraction, text)
+
+        return report
 
     def tell(self, lines) -> None:
         """Lines for people, each once."""

@@ -198,7 +198,7 @@ def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd)
     fps = job.order.fps
     first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
     times = np.arange(first, last + 1) / fps
-    plan = ball_plan(match, solved, *span, fps)
+    plan = ball_plan(match, solved, span[0], span[1], fps)
     if plan is None:
         return BallPath(times, np.full((len(times), 3), np.nan), np.zeros(len(times), bool))
     ball = met(course(plan, times), first, ((part.led_frames, part.led) for part in crowd.values()))

@@ -302,5 +302,5 @@ def _named_key(value, clips: int, where: str) -> NamedKey:
     time, clip, frame, start, end, words = _row(value, f"{where}: placed", 6)
     if not 0 <= whole_number(clip, where) < clips:
         raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
-    times = (number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(number(time, where), whole_number(clip, where), *times, _words(words, where))
+    frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
+    return NamedKey(number(time, where), whole_number(clip, where), frame, start, end, _words(words, where))

@@ -7,6 +7,7 @@ bent."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -55,7 +56,7 @@ def two_bone(
     """
     _check_chain(skeleton, joints)
     places, world = pose_kinematics(skeleton, root, rotations)
-    end = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
+    end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
     found, miss = bent_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
     out = np.array(rotations, dtype=float)
     for joint, local in found.items():

@@ -55,7 +55,7 @@ class HitMotion:
     first: int
     last: int
     high: int
-    fasts: tuple[int, int]
+    fasts: tuple[int, ...]
     key: int
     max_speed: float
     vectors: np.ndarray

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from typing import Any
 from types import MappingProxyType
 
 from ..base.settings import defaults, setting
@@ -43,7 +44,7 @@ LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
 FAR = 100.0
 """Metres between two players, above which nobody passes."""
 
-Place = tuple[float, float]
+Place = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class BallChoice:
     """A ball: one of the known kinds, with other numbers where `changes` says so (`physics.Ball`'s own names)."""
 
     kind: str = "paper"
-    changes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    changes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self):
         object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,7 +36,7 @@ from ..synthesis.take import Take
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
 
-BALL_LIMITS = {
+BALL_LIMITS: dict[str, Any] = {
     **{name: (setting("passes", name).least, setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
     "mass": (0.001, 20.0), "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "friction": (0.0, 5.0),
@@ -196,7 +197,7 @@ def _with_chance(scene: PassScene) -> PassScene:
         if draw < scene.missed + scene.dropped:
             order[number] = replace(one, error="missed" if draw < scene.missed else "dropped")
             break
-    return replace(scene, passes=order[: number + 1], repeat=1)
+    return replace(scene, passes=tuple(order[: number + 1]), repeat=1)
 
 
 def _sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
@@ -312,7 +313,7 @@ def _played(
     return replace(moved, take=replace(grown, ball=path), gaps=moved.gaps * size, moved=moved.moved * size)
 
 
-def _sized(order: HitOrder | Stance, size: float) -> HitOrder | Stance:
+def _sized(order, size: float):
     """What a player `size` times as large as the library has to do, in the library's size."""
     if size == 1.0:
         return order

@@ -40,7 +40,7 @@ class StrikeMoments:
     def __len__(self) -> int:
         return len(self.which)
 
-    def only(self, which: np.ndarray) -> StrikeMoments:
+    def only(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
         """Those of a mask or of indices (M,)."""
         struck = self.struck
         return replace(

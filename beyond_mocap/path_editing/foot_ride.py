@@ -133,7 +133,7 @@ def follow(
 
 
 @lru_cache(maxsize=32)
-def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, Limb]]:
+def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
     """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the
     part."""
     body = identify(skeleton)
@@ -172,7 +172,8 @@ def _on_own_ground(
     above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
     lifts = [lift_to_ground(foot, sole, scale) for foot in above]
     weights = [foot.carries for foot in feet]
-    off = settled(sum(w * lift for w, lift in zip(weights, lifts)), sum(weights), scale, _FLOOR)
+    lifted = sum((w * lift for w, lift in zip(weights, lifts)), np.zeros(()))
+    off = settled(lifted, sum(weights, np.zeros(())), scale, _FLOOR)
     if np.abs(off).max(initial=0.0) > _EVEN:
         lifts = [off + lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
     return [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off

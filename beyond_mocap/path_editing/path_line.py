@@ -180,7 +180,7 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
     return out
 
 
-def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, np.ndarray]:
+def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
     """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
 
     period: samples in a round, for closed lines.

@@ -150,7 +150,7 @@ def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
     if plan.course is None:
         told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
         return [told] if plan.asked.solve_touches else []
-    missing = [
+    missing: list[str] = [
         TimedLine(
             f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
             "it stays where it is asked for", (key.time, key.time),

@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -85,7 +86,7 @@ def resynthesize(
     report = progress or (lambda fraction, text: None)
     if anew is not None:
         _check(plan, before, anew)
-    asking = {"cancelled": cancelled, "hurry": hurry}
+    asking: dict[str, Any] = {"cancelled": cancelled, "hurry": hurry}
     with threadpool_limits(limits=1):
         comparable = _comparable(plan, before)
         taken = _edited(library, plan, before, report, **asking, anew=anew) if comparable else None

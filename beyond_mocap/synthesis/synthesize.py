@@ -258,7 +258,7 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     ]
 
 
-def _shown_all_the_same(take: Take) -> list[str]:
+def _shown_all_the_same(take: Take) -> list[TimedLine]:
     """One warning per stretch and word that must not be, where no way without it was found; what key moments close by
     ask for is not told."""
     times = take.start_time + np.arange(len(take.words)) / take.motion.fps
@@ -293,7 +293,7 @@ def _pins_missed(take: Take) -> list[str]:
     return told
 
 
-def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:
+def _gave_way(library: Library, plan: Plan, take: Take) -> list[TimedLine]:
     """What could not all hold, and when."""
     played = played_from_take(take)
     return give_way(

@@ -113,7 +113,7 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
 def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
     """A slow aimless wave (N,) of about unit size: four sines around `period` seconds with seeded phases."""
     random = np.random.default_rng(seed)
-    rates, phases = (0.6, 0.9, 1.35, 1.9) / np.float64(period), random.uniform(0.0, 2.0 * np.pi, 4)
+    rates, phases = np.array([0.6, 0.9, 1.35, 1.9]) / period, random.uniform(0.0, 2.0 * np.pi, 4)
     return np.sin(2.0 * np.pi * rates * times[:, None] + phases) @ np.array([0.5, 0.45, 0.35, 0.25])
 
 

@@ -137,7 +137,7 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
 
 
 def posture_over(
-    course: Course, steps: tuple[Footsteps, Footsteps], neutral: Neutral, style: GaitStyle, seed: int
+    course: Course, steps: tuple[Footsteps, ...], neutral: Neutral, style: GaitStyle, seed: int
 ) -> Posture:
     """The posture at all moments of `course` for feet that stand as `steps` says (left, right)."""
     above = trunk(course, neutral, style, seed)
@@ -157,7 +157,7 @@ def posture_over(
     return with_feet(posture, course.times, steps, neutral)
 
 
-def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, Footsteps], neutral: Neutral) -> Posture:
+def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: Neutral) -> Posture:
     """The posture with feet that stand as `steps` says (left, right), hips lowered where a leg would not reach. times
     (T,).
     """

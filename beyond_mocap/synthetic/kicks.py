@@ -49,7 +49,7 @@ class KickStyle:
     """
 
     approach: float
-    strides: tuple[float, float, float]
+    strides: tuple[float, ...]
     leg: tuple
     plane: tuple
     foot: tuple
@@ -157,7 +157,7 @@ def kicked(
 
 
 def contact(
-    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]]
+    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same,
     in N ways of (lift, loft)."""

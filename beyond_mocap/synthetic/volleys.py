@@ -363,7 +363,7 @@ def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Co
     return course, posture.changed(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
 
 
-def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, Footsteps]:
+def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, ...]:
     """Both feet on the ground all the time."""
     return tuple(walked_steps(course, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
 

@@ -182,7 +182,8 @@ def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, 
     grip = usual_centre(hand.finger, hand.reach)
     mine, its = (chains_of(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
     came = let_go(motion, mine, grip, example.release, shift[:, example.limb])
-    wanted = tuple(ratio * part for part in let_go(example.motion, its, grip / ratio, example.release))
+    place, speed = let_go(example.motion, its, grip / ratio, example.release)
+    wanted = ratio * place, ratio * speed
     near, far = np.array([WALL, 0.0, target[2]]), np.asarray(target)
     off = [np.linalg.norm(impact(*came, there) - impact(*wanted, there)) for there in (near, far)]
     return float(off[0]), float(off[1]), float(np.linalg.norm(impact(*wanted, far) - far))

@@ -118,7 +118,8 @@ def _blended(part: _Stretch, new: Motion, leaves: int, comes: int) -> tuple[np.n
 
 
 def _warnings(part: _Stretch, library: Library, root: np.ndarray) -> list[str]:
-    fps, warnings = part.own.fps, []
+    fps = part.own.fps
+    warnings: list[str] = []
     if not part.comes_back:
         when = part.start + part.end / fps
         text = (

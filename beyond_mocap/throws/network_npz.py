@@ -166,7 +166,7 @@ def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
     if not all(0 <= end < len(names) for end in ends):
         raise InputError("skeleton: end_parents", shown(ends), f"joints 0 to {len(names) - 1}")
     offsets, end_offsets = _taken(arrays, "offsets", (len(names), 3)), _taken(arrays, "end_offsets", (len(ends), 3))
-    return Skeleton(names, parents, offsets, ends, end_offsets)
+    return Skeleton(tuple(names), tuple(parents), offsets, tuple(ends), end_offsets)
 
 
 def _reach(row) -> dict[str, tuple]:

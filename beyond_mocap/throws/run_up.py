@@ -203,7 +203,7 @@ def _timeline_with_throw(
 ) -> tuple[Timeline, list[str]]:
     """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
     kept = [key for key in timeline.keys if not begin < key.in_force < finish]
-    told = [
+    told: list[str] = [
         TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept

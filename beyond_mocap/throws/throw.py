@@ -252,7 +252,7 @@ def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None =
 
 
 @lru_cache(maxsize=8)
-def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, ...]:
     """Where (E, 3) m, how fast (E, 3) m/s and with which spin (E, 3) rad/s such a ball leaves each example of the
     model; zero for those of another limb."""
     part = part_of(model.skeleton, limb, ball)

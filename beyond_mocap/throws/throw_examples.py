@@ -16,7 +16,7 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..annotation.labels import list_labels
-from ..ball.physics import BASEBALL, FOOTBALL
+from ..ball.physics import BASEBALL, FOOTBALL, Ball
 from ..ball.wall import meets_wall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
@@ -60,7 +60,7 @@ class Action:
     before: tuple[float, float]
     after: tuple[float, float]
     wall: float
-    ball: object
+    ball: Ball
 
 
 ACTIONS = {
@@ -331,8 +331,8 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
     there = bring(cut)
     if there is not cut:  # the same launch from another hand's place
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
-    span = tuple(second - first for second in _stretch(motion, known, action))
-    return example_of(name, who, there, limb, release, impact, launch, fps, span)
+    begin, end = _stretch(motion, known, action)
+    return example_of(name, who, there, limb, release, impact, launch, fps, (begin - first, end - first))
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:

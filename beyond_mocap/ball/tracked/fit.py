@@ -90,10 +90,9 @@ def gathered(times, positions, measured, used, spans) -> Stretches:
     weight = np.where(measured[index], 1.0 / _SEEN, 1.0 / _FILLED) * (inside & used[index])
     high = np.isfinite(points[..., 2])
     weight_z = np.where(measured[index], 1.0 / _SEEN_HEIGHT, 1.0 / _FILLED) * (inside & used[index] & high)
-    return Stretches(
-        ends - begins, *(np.array([span[place] for span in spans]) for place in (2, 3, 4)),
-        np.where(inside, times[index] - begins[:, None], 0.0), np.nan_to_num(points), weight, weight_z,
-    )  # fmt: skip
+    start, end, velocity = (np.array([span[place] for span in spans]) for place in (2, 3, 4))
+    since = np.where(inside, times[index] - begins[:, None], 0.0)
+    return Stretches(ends - begins, start, end, velocity, since, np.nan_to_num(points), weight, weight_z)
 
 
 def fit_launches(

@@ -179,7 +179,8 @@ def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str,
     ends = [(new[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new]
     end_offsets = bvh_scale.to_ours(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
     names = tuple(text.names[joint] for joint in kept)
-    return Skeleton(names, parents, offsets, [p for p, _ in ends], end_offsets * channels.scale.unit), drift
+    end_parents = tuple(parent for parent, _ in ends)
+    return Skeleton(names, tuple(parents), np.array(offsets), end_parents, end_offsets * channels.scale.unit), drift
 
 
 def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:

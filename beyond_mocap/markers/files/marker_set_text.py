@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 from ...base.errors import InputError
 from ..model.landmarks import LANDMARKS
@@ -52,9 +53,9 @@ def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
         raise InputError(name, "no line `marker set: NAME`", "the name of the set", _FORM)
     if not read.segments:
         raise InputError(name, "no segment", "a line such as `segment Hips: LASI, RASI, SACR`", _FORM)
+    lists: dict[str, Any] = {key: tuple(labels) for key, labels in read.lists.items()}
     try:
-        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about,
-                         **{key: tuple(labels) for key, labels in read.lists.items()})  # fmt: skip
+        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about, **lists)
     except InputError as error:
         raise InputError(name, str(error)) from None
 

@@ -124,7 +124,7 @@ class Touching:
         return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
-def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.ndarray], least: float = 0.0) -> Touching:
+def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], least: float = 0.0) -> Touching:
     """Where two bodies' capsules are at least `least` metres deep in each other.
 
     one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m.

@@ -79,7 +79,8 @@ def per_second(
     ground)."""
     start = int(np.floor(min(one.start_time for one in played) + 1e-6))
     end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
-    rows = {name: [None] * (end - start) for name in ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")}
+    names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
+    rows: dict[str, list] = {name: [None] * (end - start) for name in names}
     for one, track, deep in zip(played, tracks, overlap):
         second = np.floor(one.times + 1e-6).astype(int) - start
         for name, values, over in _curves(one, track, deep, ball):

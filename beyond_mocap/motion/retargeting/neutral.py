@@ -166,7 +166,7 @@ def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: floa
 
 
 def _has_tip(skeleton: Skeleton, joint: int) -> bool:
-    return joint in skeleton.end_parents and np.linalg.norm(_tip(skeleton, joint)) > 1e-4
+    return joint in skeleton.end_parents and bool(np.linalg.norm(_tip(skeleton, joint)) > 1e-4)
 
 
 def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:

@@ -15,6 +15,7 @@ steps than their own. Joints that a skeleton lacks go with the segment that carr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -250,7 +251,7 @@ def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
     return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
 
 
-def _between(shares: list[float], turns: list[np.ndarray], share: float) -> np.ndarray:
+def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], share: float) -> np.ndarray:
     """The turn (T, 4) at `share` among `turns` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)

@@ -304,13 +304,13 @@ class _Part:
         self.root = self.root - drop[:, None] * [0.0, 0.0, 1.0]
         self._posed()
 
-    def _lack(self, joint: int, goal: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
         """(W,) m that `joint` is too far from the goal, setting in softly, and (W, 3) the way there."""
         away = goal - self.places[:, joint]
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         return _SOFT_LACK * np.logaddexp(0.0, (distance - reach) / _SOFT_LACK), away / distance[:, None]
 
-    def _bend(self, spine: list[int], top: int, goal: np.ndarray, reach: float, share: np.ndarray) -> None:
+    def _bend(self, spine: list[int], top: int, goal: np.ndarray, reach, share: np.ndarray) -> None:
         """Turns the joints of the spine evenly so that `top` comes nearer to the goal by what it lacks."""
         lack, way = self._lack(top, goal, reach)
         low = self.places[:, spine[0]]

@@ -214,7 +214,7 @@ class _Foot:
             quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge[at]]), self.world[edge[at]])
             for edge in (self.before, self.behind)
         ]
-        turned = quaternion.slerp(*turn, self.through[at])
+        turned = quaternion.slerp(turn[0], turn[1], self.through[at])
         chain = (self.limb.upper_leg, self.limb.lower_leg, self.limb.foot)
         out = rotations.copy()
         out[at] = two_bone(skeleton, root[at], rotations[at], chain, target, end_rotation=turned).rotations
@@ -236,7 +236,7 @@ class _Plan:
         )
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._room())
-        self.last = None
+        self.last: int | None = None
         self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
 
     def _room(self) -> np.ndarray:

@@ -96,8 +96,8 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
     own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
-    preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, off_style=off_style,
+                  weak_foot=weak_foot, taste=own)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:

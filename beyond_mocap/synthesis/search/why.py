@@ -258,7 +258,7 @@ def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -
             return
         if name not in known:
             known.add(name)
-            yield Other(*name, float(cost[number]) - paid)
+            yield Other(name[0], name[1], float(cost[number]) - paid)
 
 
 def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam, others=()) -> Reason:

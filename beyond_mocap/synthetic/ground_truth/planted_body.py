@@ -93,7 +93,7 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
             offsets[joint] = quaternion.rotate(quaternion.inverse(world[:, parent]), bone).mean(axis=0)
     ends = [name for name in names if name.removeprefix("Left").removeprefix("Right") in _TIPS]
     tips = np.array([_tip(name, motion, named[name], turns[name], leg) for name in ends]).reshape(-1, 3)
-    skeleton = Skeleton(names, parents, offsets, [names.index(name) for name in ends], tips)
+    skeleton = Skeleton(tuple(names), tuple(parents), offsets, tuple(names.index(name) for name in ends), tips)
     local = quaternion.normalized(local_rotations(skeleton, world))
     return Motion(skeleton, places[:, named["Hips"]], local, motion.fps)
 

@@ -147,7 +147,7 @@ class JointLimits:
             allowed = self.offsets(given)
             low, high = np.minimum(low, allowed), np.maximum(high, allowed)
             most = np.maximum(most, -self.bends(given))
-        over = 0.0
+        over = np.zeros(())
         for _ in range(_TURNS):  # a hinge that comes forward may leave the box, and the other way round
             local, out = self._in_box(local, low, high)
             over, back = np.maximum(over, out), self._backwards(local, most)

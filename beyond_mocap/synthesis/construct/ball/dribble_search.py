@@ -89,7 +89,7 @@ class Search:
         start[:, 2] = BALL_RADIUS
         radius = self.body.feet[0].radius
         level = np.column_stack([self.normal, np.zeros(len(table))])
-        self.place = touching_places(tuple(end[:, None] for end in line), radius, start, level)
+        self.place = touching_places((line[0][:, None], line[1][:, None]), radius, start, level)
         usable = np.abs(nearest_on(line, self.place)[:, 2] - BALL_RADIUS) <= _LEVEL
         velocity = np.stack([self.body.foot_velocity(0), self.body.foot_velocity(1)])
         self.velocity = velocity[self.side, self.frame]

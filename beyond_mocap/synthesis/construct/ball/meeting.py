@@ -138,7 +138,7 @@ def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.
     return start + (near + step)[:, None] * direction
 
 
-def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
+def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
     """A ball between both hands: its place (3,) m, and what each hand has to move (2, 3) m to touch it."""
     places = np.array([0.5 * (start + end) for start, end in hands])
     middle = places.mean(axis=0)

@@ -365,7 +365,7 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
     middle = np.mean(body.line(part, at), axis=0)
     away = _flat(middle + shift - pelvis)
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
-    ranged = np.clip(wanted, min(PELVIS_RANGE[0], own), max(PELVIS_RANGE[1], own))
+    ranged = np.clip(wanted, min(PELVIS_RANGE[0], float(own)), max(PELVIS_RANGE[1], float(own)))
     return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
 
 
@@ -400,7 +400,7 @@ def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
     return [Resting.of(body, leg(limb) if part == "foot" else arm(limb)) for limb, part in limbs]
 
 
-def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
+def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarray) -> Body:
     """The body with each part moved by its shift (3,) m, blended by its share."""
     part, root, rotations = scene.parts[0], body.root, body.rotations
     if not limbs:
