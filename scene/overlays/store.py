@@ -133,5 +133,6 @@ def _poll() -> float | None:
 
 
 WATCHER = Watcher(
-    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed, ends=clear
+    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed,
+    ends=clear,
 )

@@ -38,7 +38,8 @@ def analyse(
 ) -> "Hits":
     """Find the strikes in an armature's motion, note them for the panel and mark them on its action.
 
-    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to mark.
+    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to
+    mark.
     """
     from ...beyond_mocap.passes.hits import analyse as find
 
