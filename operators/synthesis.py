@@ -9,8 +9,8 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import rows_of
 from ..scene.core import background, session
-from ..scene.result import freshness, orders, queue, stretch
 from ..scene.core.settings import active_player
+from ..scene.result import freshness, orders, queue, stretch
 from .turns import TurnsVerb
 
 

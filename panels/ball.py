@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.ball.settings import aimed_ball
-from ..scene.passes.settings import active_row, ball_of, subject, told_lines, picture_icon
+from ..scene.passes.settings import active_row, ball_of, picture_icon, subject, told_lines
 from .passes import passing
 from .stream import live, stream
 from .tab import Step, paragraph, section, split, table

@@ -20,11 +20,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
 from beyond_mocap.markers.files.trc_write import write_trc  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall  # noqa: E402
 from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
 from beyond_mocap.motion.retargeting.adult import adult_skeleton  # noqa: E402
 from beyond_mocap.synthetic.gait import gait  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted  # noqa: E402
 from beyond_mocap.synthetic.throws import throw  # noqa: E402
 
 SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)

@@ -36,8 +36,7 @@
 - `clips`, `watch`   the library's clips as a list; whether its folder has changed
 """
 
-from .core import session
-from .core import registration
+from .core import registration, session
 from .core.live import start_watching, stop_watching
 from .markers import kept
 from .match import child

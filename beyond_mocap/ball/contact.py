@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.vectors import unit_vector, unit_vectors
+from ..annotation.striking import BODY_PARTS, Surface, part_surfaces
 from ..base.errors import InputError
+from ..base.vectors import unit_vector, unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..annotation.striking import BODY_PARTS, Surface, part_surfaces
 from ..motion.track import BALL_RADIUS
 
 PARTS = (*BODY_PARTS, "tool")

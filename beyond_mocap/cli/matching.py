@@ -6,8 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..base.settings.options import add_options, option_values
 from ..base.errors import BeyondMocapError, InputError
+from ..base.settings.options import add_options, option_values
 from .outputs import Writer, check_outputs, named_folder
 from .progress_reporter import Told
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.settings.options import add_options
 from ..base.errors import InputError
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 
@@ -45,6 +45,7 @@ def _require_training() -> None:
             raise ImportError
         import jax  # noqa: F401
         import optax  # noqa: F401
+
         import training  # noqa: F401
     except ImportError:
         raise InputError("throw train", FOUND, EXPECTED, NEXT_STEP) from None

@@ -14,9 +14,9 @@ from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
 from ..synthesis.quality import feet, jerk, pieces, root
-from . import realism, words
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
+from . import realism, words
 from .reference import source_poses
 from .view import View
 

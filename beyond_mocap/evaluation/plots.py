@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.runs import runs
 from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate
-from ..base.runs import runs
 from ..motion.track import BALL_RADIUS
-from . import figures, realism
 from ..synthesis.quality import pieces, root
+from . import figures, realism
 from .view import View
 
 WIDTH = 11.0

@@ -12,10 +12,10 @@ from ..annotation import Timeline
 from ..base.errors import InputError, spans_of
 from ..library.library import Library
 from ..motion.track import Track
-from ..synthesis.take import Take
-from . import figures
 from ..synthesis.quality.moments import dribble_touches
 from ..synthesis.quality.played import Played, played_from_take
+from ..synthesis.take import Take
+from . import figures
 from .view import View
 
 VERSION = 1

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
-from ..synthetic.landing import ends_in_flight, landed
 from ..motion.motion import Motion
+from ..synthetic.landing import ends_in_flight, landed
 from ..synthetic.moves import getting_up
 from .scan import CACHE_FOLDER
 

@@ -14,9 +14,9 @@ from typing import Any, Callable
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds
-from ..base.errors import InputError
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS
+from ..base.errors import InputError
 from ..motion.skeleton import Skeleton
 from . import cache
 from .clip import Clip

@@ -26,19 +26,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
-from ..base.vectors import cross
-from ..annotation import LOCOMOTION
-from ..motion import contacts, quaternion
-from ..synthetic import gestures
+from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, gait_thresholds
 from ..base.arctangent import arctan2
-from ..synthetic.course import GaitStyle
-from ..synthetic.gait import gait
+from ..base.runs import equal_runs, runs
+from ..base.vectors import cross
+from ..motion import contacts, quaternion
+from ..motion.foot_plant import plant
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
-from ..base.runs import equal_runs, runs
-from ..motion.foot_plant import plant
+from ..synthetic import gestures
+from ..synthetic.course import GaitStyle
+from ..synthetic.gait import gait
 from .features import Frames
 from .scan import CACHE_FOLDER
 

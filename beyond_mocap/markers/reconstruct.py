@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import __version__
-from ..base.settings import defaults, setting
 from ..base.errors import Cancelled, InputError
+from ..base.settings import defaults, setting
+from ..motion.motion import Motion
 from .cleaning.clean import Cleaned, clean
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, Solved, solve
 from .trial import MarkerTrial
-from ..motion.motion import Motion
 
 _DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
@@ -260,8 +260,8 @@ def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Clean
 
 
 def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
-    from .model.calibrate import calibrate
     from .checks import some
+    from .model.calibrate import calibrate
 
     try:
         return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)

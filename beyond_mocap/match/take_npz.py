@@ -13,15 +13,15 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
 from ..base.errors import InputError
-from .pieces.named_edit import NamedEdit, NamedKey
-from .player_edit import PlayerEdit, Stretch, course_times
-from ..motion.track import Track
-from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
-from .crowd.correction import Correction
 from ..files.content import content
 from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
 from ..files.plain_npz import HEADER, header_text, plain_arrays
 from ..files.whole import atomic_write
+from ..motion.track import Track
+from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
+from .crowd.correction import Correction
+from .pieces.named_edit import NamedEdit, NamedKey
+from .player_edit import PlayerEdit, Stretch, course_times
 
 VERSION = 1
 FORMAT = "Beyond Mocap player of a match"

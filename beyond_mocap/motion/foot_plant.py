@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from ..base.arctangent import arctan2
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.runs import run_numbers
 from ..base.time_series import hann_smooth
 from ..base.vectors import cross
 from . import quaternion
-from ..base.arctangent import arctan2
 from .contacts import sole_height
 from .humanoid import Limb, identify
 from .motion import pose_kinematics
-from ..base.runs import run_numbers
-from .skeleton import Skeleton
 from .reach import two_bone
+from .skeleton import Skeleton
 
 SMOOTH, PULL = 0.005, 3e-4
 """Weights of `shift`."""

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ..base.vectors import cross, unit_vectors
 from ..base.errors import InputError
+from ..base.vectors import cross, unit_vectors
 from . import limb, quaternion
 from .motion import pose_kinematics
-from .skeleton import Skeleton
 from .retargeting.structure import path
+from .skeleton import Skeleton
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
 CLEAR_BEND = 0.06

@@ -15,14 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ..annotation.ball_contact import may_use_several, striking_part
+from ..annotation.striking import BODY_PARTS
+from ..ball.contact import Tool
 from ..base.digest import hex_digest
 from ..library.clip import Clip
 from ..library.library import Library
-from ..annotation.ball_contact import striking_part
-from ..annotation.ball_contact import may_use_several
-from ..annotation.striking import BODY_PARTS
 from . import kept
-from ..ball.contact import Tool
 from .hits import HitMotion, analyse, hit_at
 
 KINDS = ("toss", "pass", "attack")

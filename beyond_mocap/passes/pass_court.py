@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import Cancelled
-from ..motion import quaternion
 from ..ball.aim import Aimed, aim
 from ..ball.contact import Tool, in_world
+from ..ball.physics import FASTEST, Ball
+from ..base.errors import Cancelled
+from ..motion import quaternion
 from .pass_costs import clears_net, out_of_the_way, spun, ways_of
 from .pass_scene import GROUND, Pass, PassScene, served_by
-from ..ball.physics import FASTEST, Ball
 from .strike_moments import StrikeMoments
 
 ON_TARGET = 0.02

@@ -6,12 +6,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
 from types import MappingProxyType
+from typing import Any
 
-from ..base.settings import defaults, setting
-from ..base.errors import InputError
 from ..ball.contact import Tool
+from ..base.errors import InputError
+from ..base.settings import defaults, setting
 from .hits import HitMotion
 
 KINDS = ("toss", "pass", "attack")

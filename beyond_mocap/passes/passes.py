@@ -13,6 +13,16 @@ from typing import Any
 import numpy as np
 
 from ..ball.contact import Tool
+from ..ball.physics import BALLS, Ball
+from ..base.errors import Cancelled, InputError, NotInLibrary
+from ..base.settings import setting
+from ..library.library import Library
+from ..motion.humanoid import stature
+from ..motion.quaternion import multiply
+from ..motion.track.ball_path import BallPath
+from ..synthesis.own_size import in_own_size
+from ..synthesis.take import Take
+from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .hit_library import MatchWeights
 from .hits import HitMotion, strongest
 from .links import BoneWeights
@@ -20,18 +30,8 @@ from .orders import HitOrder, Stance
 from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
-from ..ball.physics import BALLS, Ball
 from .strike_choice import Choice, unsaid
 from .strike_moments import StrikeMoments, strike_moments
-from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
-from ..base.settings import setting
-from ..base.errors import Cancelled, InputError, NotInLibrary
-from ..library.library import Library
-from ..motion.humanoid import stature
-from ..motion.quaternion import multiply
-from ..synthesis.own_size import in_own_size
-from ..motion.track.ball_path import BallPath
-from ..synthesis.take import Take
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""

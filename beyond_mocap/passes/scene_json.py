@@ -10,10 +10,10 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ..ball.contact import Tool
-from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
+from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
 """Bytes of a file above which it is no scene."""

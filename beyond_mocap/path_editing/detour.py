@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..motion.path.arc_length import ArcLength
-from ..base.arctangent import arctan2
 from ..motion.path.path import Path, SplinePath
 
 RISE = 0.4

@@ -15,15 +15,26 @@ import numpy as np
 
 from ..base.vectors import unit_vector
 from ..motion import quaternion
+from ..motion.foot_plant import (
+    MOST_DROP,
+    Foot,
+    Planted,
+    heel_rise,
+    held_less,
+    held_shift,
+    lacking,
+    laid_foot,
+    lift_to_ground,
+    pelvis_drop,
+    settled,
+    spread_over,
+    turned_flat,
+)
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
+from ..motion.reach import CLEAR_BEND, bent_limb
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
-from ..motion.foot_plant import (
-    MOST_DROP, Foot, Planted, heel_rise, held_less, held_shift, lacking, lift_to_ground, laid_foot, pelvis_drop,
-    settled, spread_over, turned_flat,
-)
-from ..motion.reach import CLEAR_BEND, bent_limb
 from .ground_contact import Surface, footing
 
 MOST_SHIFT = 0.45

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.runs import runs
 from ..base.time_series import interpolate
 from ..base.vectors import distance_along, unit_vectors
-from ..base.errors import InputError
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
-from ..base.runs import runs
 from ..motion.path.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15

@@ -20,10 +20,10 @@ from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedLine
 from ..motion.track import BALL_RADIUS
-from .plan import Plan, SolvedCourse, Touched
 from .construct.ball.dribble import dribble
 from .construct.ball.meeting import led, lofted
 from .construct.ball.strike import held_frames
+from .plan import Plan, SolvedCourse, Touched
 from .resolved_plan import ResolvedPlan
 from .take import DribbleTouch, KeyResult, Take
 

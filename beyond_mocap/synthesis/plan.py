@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..annotation import Timeline
+from ..base.errors import InputError, told_time
 from ..base.settings import defaults, rows_of, setting
 from ..base.settings.setting import check_limits
-from ..base.errors import InputError, told_time
 from ..motion.skeleton import frozen_array
 from ..motion.track import SampledTrack, Track, sample
 

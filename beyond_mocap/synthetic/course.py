@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step
-from ..base.time_series import hann_smooth
 from ..base.errors import InputError
+from ..base.time_series import hann_smooth
+from ..motion.retargeting.neutral import Neutral
 from . import gait_tables as tables
 from .gait_tables import at_speed
-from ..motion.retargeting.neutral import Neutral
 
 # the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
 # all the time, from this speed on, metres per second

@@ -16,17 +16,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.time_series import hann_smooth, interpolate
-from . import gait_tables as tables
+from ..motion.humanoid import identify
+from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, travel
 from .gait_tables import at_speed
 from .gait_trunk import arms, trunk
-from ..motion.humanoid import identify
-from ..motion.motion import Motion
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
-from ..motion.skeleton import Skeleton
 
 # how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
 _AHEAD, _BEHIND = 0.41, 0.72

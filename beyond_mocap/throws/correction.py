@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ball import batch
+from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.motion import Motion, forward_kinematics, place
-from ..ball import batch
-from ..ball.physics import Ball
 from .led_limb import Hold, LedLimb, at_once
 from .letting_go import AtFoot, InHand, carried, grip_point
 from .shift import shifts_about

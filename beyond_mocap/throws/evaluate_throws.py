@@ -12,17 +12,14 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..motion.hand import hand_of
-from ..motion.hand import usual_centre
 from ..base.errors import Cancelled, InputError
-from ..synthesis.quality.jerk import jerk
 from ..evaluation.paired_tests import kept
-from .report.deviation import deviations, lost_ones
-from .report.impact import WALL, impact, let_go
 from ..files.tables import plain
 from ..motion import quaternion
+from ..motion.hand import hand_of, usual_centre
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
+from ..synthesis.quality.jerk import jerk
 from .networks.chains import EFFECTORS, chains_of
 from .networks.description import scaled
 from .networks.example import Example, describe
@@ -30,6 +27,8 @@ from .networks.generate import Generated, Options, generate
 from .networks.kinematics import matrices
 from .networks.limits import JointLimits
 from .networks.model import ThrowModel
+from .report.deviation import deviations, lost_ones
+from .report.impact import WALL, impact, let_go
 
 RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 """As tables 8.1 to 8.4 were measured: what networks say is fed back, nothing corrects it."""

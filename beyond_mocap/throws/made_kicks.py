@@ -10,20 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import interpolate
-from ..base.errors import InputError
-from ..motion import quaternion
-from ..motion.retargeting.adult import adult_skeleton
-from ..base.arctangent import arctan2
-from ..motion.retargeting.adult import LEG
-from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
-from ..motion.motion import Motion, place
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.skeleton import Skeleton
 from ..annotation.striking import FOOT_RADIUS
 from ..ball.physics import FOOTBALL, Ball
-from .struck import struck
 from ..ball.wall import meets_wall
+from ..base.arctangent import arctan2
+from ..base.errors import InputError
+from ..base.time_series import interpolate
+from ..motion import quaternion
+from ..motion.motion import Motion, place
+from ..motion.retargeting.adult import LEG, adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.skeleton import Skeleton
+from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
+from .struck import struck
 
 SLOWEST, FASTEST = 6.0, 36.0
 """m/s of a ball."""

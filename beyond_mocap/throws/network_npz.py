@@ -11,16 +11,16 @@ from dataclasses import asdict, fields
 import numpy as np
 
 from ..base.errors import InputError
+from ..files.content import content
+from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
+from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.whole import atomic_write
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .networks.chains import EFFECTORS
 from .networks.example import Example
 from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
-from ..files.content import content
-from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
-from ..files.plain_npz import HEADER, header_text, plain_arrays
-from ..files.whole import atomic_write
 
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"

@@ -22,15 +22,17 @@ from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
 from ..files.content import content
 from ..files.tables import number, read_rows
-from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME, Annotations, find_clips
+from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
+from ..library.scan import Annotations, find_clips
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
-from ..synthetic.grip import grip_of
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from .networks.chains import EFFECTORS as LIMBS, chains_of
+from ..synthetic.grip import grip_of
+from .networks.chains import EFFECTORS as LIMBS
+from .networks.chains import chains_of
 from .networks.example import Example, example_of, mirrored
 
 TABLE_NAME = "throws.csv"

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core import channels
-from ..core import window
+from ..core import channels, window
 from ..core.live import Watcher, attempt
 from . import shots
 from .settings import MARK, aimed

@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
 )
 
-from .properties import active_row, with_settings
+from ..overlays.settings import BeyondMocapView
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
-from ..timeline.video import BeyondMocapVideo, renew
-from ..overlays.settings import BeyondMocapView
 from ..rigs.rig import BeyondMocapRig
+from ..timeline.video import BeyondMocapVideo, renew
+from .properties import active_row, with_settings
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:

@@ -6,7 +6,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from bpy.props import (
-    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
 )
 
 from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS

@@ -5,9 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from . import store
 from ..core import window
 from ..core.properties import with_settings
+from . import store
 
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 """The overlays, in the order in which they are drawn and listed."""

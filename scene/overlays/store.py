@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..core import background, session
-from ..core import window
+from ..core import background, session, window
 from ..core.live import Watcher, soon
 from ..core.properties import active_row
 from . import place

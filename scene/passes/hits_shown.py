@@ -16,8 +16,8 @@ from ..path_editing.rigs import carrier_of, rides_as_rig
 from . import graph
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.passes.hits import Hits
     from ...beyond_mocap.motion.motion import Motion
+    from ...beyond_mocap.passes.hits import Hits
 
 MARKER = "hit"  # the names of our markers begin with it
 _COLUMNS = 480

@@ -11,8 +11,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError
-from ..core import background
-from ..core import window
+from ..core import background, window
 from ..core.live import Watcher, is_playing
 from . import make, rally
 from .settings import PLAYED

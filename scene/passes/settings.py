@@ -6,7 +6,13 @@ import json
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
 )
 
 from ...beyond_mocap.base.digest import byte_digest

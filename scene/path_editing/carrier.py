@@ -16,9 +16,9 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels, linked
-from ..rigs import armature
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
+from ..rigs import armature
 from . import keys
 
 MARK = "beyond_mocap_ride"

@@ -15,13 +15,13 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
-from ..rigs import armature
 from ..core import channels
 from ..core.action import PLACED
 from ..core.measure import frames_per_second, units_per_metre
-from ..rigs.posing import CHANNELS
-from ..rigs.bone_curves import is_carried
 from ..core.set_aside import play_as_before, put_aside, stance_of, stand
+from ..rigs import armature
+from ..rigs.bone_curves import is_carried
+from ..rigs.posing import CHANNELS
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, PlainCarrier, Read
 from .rig_source import BONE, RigSource, layered, playing_strips

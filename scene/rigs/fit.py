@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
-from ...beyond_mocap.base.vectors import nearest_axis
 from .driven import Driven
 from .source import Source
 
@@ -44,8 +44,8 @@ class Fit:
 
     def __init__(self, driven: Driven, source: Source, options: BakeOptions):
         from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
-        from ...beyond_mocap.motion.retargeting.retarget import Retargeter
         from ...beyond_mocap.motion.foot_plant import plant
+        from ...beyond_mocap.motion.retargeting.retarget import Retargeter
 
         if options.exact:
             self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []

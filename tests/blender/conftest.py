@@ -25,8 +25,8 @@ _repository.mkdir(parents=True)
 (_repository / "beyond_mocap").symlink_to(SOURCE, target_is_directory=True)
 sys.modules["beyond_mocap"] = None
 
-import bpy  # noqa: E402
 import addon_utils  # noqa: E402  (bpy brings it)
+import bpy  # noqa: E402
 
 
 @atexit.register

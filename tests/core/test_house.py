@@ -6,11 +6,24 @@ import re
 import sys
 import tomllib
 
-import draw_house
 import pytest
+
+import draw_house
 from house import (
-    BLENDER, CORE, LAYERS, MOST_FILES, TOP, count_side_by_side, file_graph, find_circles, is_below, list_sources,
-    may_import, parse_source, read_imports, room_of,
+    BLENDER,
+    CORE,
+    LAYERS,
+    MOST_FILES,
+    TOP,
+    count_side_by_side,
+    file_graph,
+    find_circles,
+    is_below,
+    list_sources,
+    may_import,
+    parse_source,
+    read_imports,
+    room_of,
 )
 
 ARRAYS = {"numpy", "scipy"}

@@ -6,7 +6,17 @@ import time
 import bpy
 import numpy as np
 from tab import (
-    PICTURES, assert_no_trouble_since, output, press, printed_since, room, run, sample, settings, settled, until,
+    PICTURES,
+    assert_no_trouble_since,
+    output,
+    press,
+    printed_since,
+    room,
+    run,
+    sample,
+    settings,
+    settled,
+    until,
     wait_for_work,
     window,
 )  # fmt: skip

@@ -6,7 +6,6 @@ import bpy
 from tab import PICTURES, TAB, assert_no_trouble_since, output, room, run, sample, settings, settled, until, window
 
 
-
 def player():
     """The drawn player."""
     return settings().players["Drawn"]

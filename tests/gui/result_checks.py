@@ -8,7 +8,6 @@ import numpy as np
 from tab import EXTENSION, PICTURES, TAB, output, room, run, sample, settings, settled, until, window, within
 
 
-
 def work():
     """What runs just now."""
     return bpy.context.window_manager.beyond_mocap_work

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.easing import hermite
-from ...base.vectors import unit_vectors
 from ...base.errors import Cancelled
+from ...base.vectors import unit_vectors
 from ..batch import courses
 from ..physics import FOOTBALL, Ball
 from .coarse import coarse_courses

@@ -20,13 +20,13 @@ from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, heading
 from ...motion.motion import Motion
-from ...motion.skeleton import Skeleton
 from ...motion.retargeting.structure import below
+from ...motion.skeleton import Skeleton
+from ..whole import beside
 from . import bvh_scale, bvh_text
 from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
-from ..whole import beside
 
 _STILL_METRES = 1e-3  # what moves less is written as still
 _STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree

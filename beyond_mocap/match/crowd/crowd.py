@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...motion.motion import Motion
 from ...base.runs import runs
+from ...motion.motion import Motion
 from .capsules import FAR, capsules, lines, touching
 from .correction import CURVES, Correction, carried
 from .crowd_body import CrowdBody, moved

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
-from ...motion.motion import Motion, pose_kinematics
 from ...annotation.striking import ball_gap
+from ...motion.motion import Motion, pose_kinematics
 from ...motion.track import BALL_RADIUS
 from ...synthesis.construct.ball.strike_at import Meeting, met_at
 from ...synthesis.take import KeyResult, Take

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...synthesis.quality import feet, root
-from ...synthesis.quality.played import Played, played_from_take
 from ...evaluation.report import evaluate, rounded
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
+from ...synthesis.quality import feet, root
+from ...synthesis.quality.played import Played, played_from_take
 from ...synthesis.take import Take
 
 _MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}

@@ -23,11 +23,11 @@ import numpy as np
 
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
-from .anatomy import Anatomy, head_chain, spine_shares, study
-from .bone_map import Pairs, pair
 from ..humanoid import Limb
 from ..motion import Motion, forward_kinematics, local_rotations
 from ..skeleton import Skeleton
+from .anatomy import Anatomy, head_chain, spine_shares, study
+from .bone_map import Pairs, pair
 
 _SOFT = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
+from ...annotation.striking import faster_middle
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
-from ...annotation.striking import faster_middle
 from .ball.strike import Touch
 
 MOST = np.radians(60.0)

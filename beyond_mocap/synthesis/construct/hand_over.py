@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import quaternion
+from ...motion.foot_plant import shift
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics, world_rotation
 from ...motion.skeleton import Skeleton
 from .ball.carry import Body, Resting, leg, limb_carried
-from ...motion.foot_plant import shift
 from .ball.meeting import eased
 
 Pose = tuple[np.ndarray, np.ndarray]

@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
+from ...base.runs import runs
 from ...base.vectors import unit_vector
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.humanoid import Humanoid, heading_from_positions, identify
 from ...motion.motion import Motion, pose_kinematics
-from ...base.runs import runs
+from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from .ball.carry import arm, leg
-from ...motion.reach import two_bone
 
 FADE = 0.3
 """Seconds before and behind a pin in which the body comes to it and leaves it."""

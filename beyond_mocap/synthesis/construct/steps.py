@@ -16,15 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.easing import smoothstep
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...base.easing import smoothstep
+from ...base.runs import runs
+from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics
-from ...base.runs import runs
+from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
-from ...motion.reach import two_bone
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.40, 0.45])

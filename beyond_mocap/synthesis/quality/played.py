@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ...base.errors import InputError
-from ...library.library import Library
 from ...library.landings import LANDING_FOLDER
+from ...library.library import Library
 from ...library.made import FPS as MADE_FPS
 from ...library.made import MADE_FOLDER
 from ...motion import contacts as foot_contacts

@@ -8,8 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import (
-    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill,
-    gait_thresholds, spoken, words_per_frame,
+    MUST_NOT,
+    STANDING_SPEED,
+    TRANSITION,
+    KeyMoment,
+    Timeline,
+    automatic_gaits,
+    avoided_per_frame,
+    fill,
+    gait_thresholds,
+    spoken,
+    words_per_frame,
 )
 from ...base.errors import NotInLibrary, TimedLine, told_time
 from ...library.automatic import automatic_words

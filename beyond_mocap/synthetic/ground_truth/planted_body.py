@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...motion import quaternion
-from ...motion.retargeting.anatomy import Anatomy, head_chain, study
 from ...base.arctangent import arctan2
+from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_posed
 from ...motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics
+from ...motion.retargeting.anatomy import Anatomy, head_chain, study
 from ...motion.skeleton import Skeleton
 
 _X, _Y, _Z = np.eye(3)

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.vectors import unit_vector
-from ...base.errors import InputError
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...base.errors import InputError
+from ...base.vectors import unit_vector
+from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton, frozen_array
 

@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
+import made
 import numpy as np
 import pytest
-import made
 
 RATES = {"24": (24, 1.0), "23.976": (24, 1.001), "30": (30, 1.0), "60": (60, 1.0)}
 

@@ -4,9 +4,9 @@ import importlib
 import os
 
 import bpy
+import made
 import numpy as np
 import pytest
-import made
 from undo import assert_one_step, state
 
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....base.runs import runs
 from ....annotation.striking import nearest_on
+from ....ball.roll import rolls, speeds_of
+from ....base.runs import runs
 from ....motion.track import BALL_RADIUS
 from .legs import SLOW, Legs
 from .meeting import touching_places
-from ....ball.roll import rolls, speeds_of
 
 SOONEST, _LATEST = 0.2, 1.3
 """Seconds from one touch to the next."""

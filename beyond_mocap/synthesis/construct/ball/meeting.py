@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....annotation.striking import ball_gap, nearest_on
 from ....base.easing import quintic_step_by_powers
 from ....base.vectors import unit_vectors
 from ....motion.quaternion import turned_about_up
-from ....annotation.striking import ball_gap, nearest_on
 from ....motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ....annotation.striking import Surface, ball_gap, nearest_on
 from ....motion.humanoid import identify
 from ....motion.motion import Motion
-from ....annotation.striking import Surface, ball_gap, nearest_on
 from ..above_ground import above_ground
 from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import eased
