@@ -4,8 +4,8 @@
 
 `static.trc` somebody who stands still, `throw.c3d` the same body and a ball with one marker thrown at 28 m/s,
 `walk.trc` another body walking, without a static trial, with gaps, a swap and an unlabeled stretch. Whatever is found
-in them can be compared with what was made (`beyond_mocap.synthetic.ground_truth.planted_markers`). The same code gives the same bytes. Needs
-the core and the C3D package."""
+in them can be compared with what was made (`beyond_mocap.synthetic.ground_truth.planted_markers`). The same code gives
+the same bytes. Needs the core and the C3D package."""
 
 from __future__ import annotations
 

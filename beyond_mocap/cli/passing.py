@@ -19,7 +19,8 @@ from .progress_reporter import Told
 def add(verbs):
     """The verb's parser."""
     verb = verbs.add_parser("passes", help="several players keep a ball going")
-    verb.add_argument("scene", type=Path, metavar="SCENE.json", help="who passes to whom; docs/passes/passes.md has its form")
+    verb.add_argument("scene", type=Path, metavar="SCENE.json",
+                      help="who passes to whom; docs/passes/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
     verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
     add_options(verb, "library")

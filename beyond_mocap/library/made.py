@@ -133,7 +133,8 @@ def made_clips(
 
 
 def upright_example(clips: Sequence) -> Motion:
-    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way this skeleton
+    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way
+    this skeleton
     stands. A single recording of a run leans, and made running would lean twice."""
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored

@@ -1,5 +1,5 @@
-"""ID.take.npz: all that is kept of a player of a match (docs/match/match.md): a zip of plain arrays of whole numbers and a
-few fractions, with one JSON text for what is no array. Places are in millimetres and times in microseconds, as
+"""ID.take.npz: all that is kept of a player of a match (docs/match/match.md): a zip of plain arrays of whole numbers
+and a few fractions, with one JSON text for what is no array. Places are in millimetres and times in microseconds, as
 differences of differences, which pack well."""
 
 from __future__ import annotations

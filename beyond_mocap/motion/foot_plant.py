@@ -119,7 +119,8 @@ def plant(
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
     about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
     pelvis is lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is
-    moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels: standing feet are
+    moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels:
+    standing feet are
     brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
     own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
     """

@@ -3,7 +3,8 @@ between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
 `passes.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
-(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball is never moved.
+(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball
+is never moved.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form as a
-file)."""
+"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form
+as a file)."""
 
 from __future__ import annotations
 

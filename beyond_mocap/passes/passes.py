@@ -1,7 +1,7 @@
 """The recipe of a passing scene: several players keep a ball going (Ball handling).
 
-`passes.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each player;
-the ball's path is the flights, one after the other.
+`passes.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each
+player; the ball's path is the flights, one after the other.
 """
 
 from __future__ import annotations

@@ -216,7 +216,8 @@ def prepare(
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
     """The motion of `source` on `path`.
 
-    ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across it.
+    ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across
+    it.
     The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the
     path has no length.
     """

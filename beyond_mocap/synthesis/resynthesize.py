@@ -5,10 +5,10 @@
     take = resynthesize(library, plan, take)
 
 What counts as touched is said in `synthesis.search.touched`. Touched stretches are searched between frames that stay
-(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to
-the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only where the body turns a
-full turn more or less than before, the quaternions behind may have the other sign, since a motion's signs are
-continuous.
+(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed
+over to the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only
+where the body turns a full turn more or less than before, the quaternions behind may have the other sign, since a
+motion's signs are continuous.
 """
 
 from __future__ import annotations

@@ -4,9 +4,10 @@
     track, report = clean(read_track_csv("player.csv"))
     take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
 
-The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`, or
-`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and laid on the track
-(`synthesis.construct`).
+The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`,
+or
+`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and
+laid on the track (`synthesis.construct`).
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays, with one
-JSON text for what is no array. Nothing in it is ever executed."""
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays,
+with one JSON text for what is no array. Nothing in it is ever executed."""
 
 from __future__ import annotations
 

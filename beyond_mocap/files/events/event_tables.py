@@ -1,4 +1,5 @@
-"""Events in tables: our own, of which docs/match/match-input.md names the columns, and Metrica's, which kloppy leaves out."""
+"""Events in tables: our own, of which docs/match/match-input.md names the columns, and Metrica's, which kloppy leaves
+out."""
 
 from __future__ import annotations
 

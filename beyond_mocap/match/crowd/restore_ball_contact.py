@@ -16,7 +16,8 @@ from ...synthesis.construct.ball.strike_at import Meeting, met_at
 from ...synthesis.take import KeyResult, Take
 
 CLOSED = 0.15
-"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more plays as he does."""
+"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more
+plays as he does."""
 
 OPEN = 1e-3
 """Metres of gap that are left."""

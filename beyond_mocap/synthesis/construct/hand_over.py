@@ -53,7 +53,8 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
 
 
 def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
-    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion has
+    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion
+    has
     them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
 
     place (T, 3) m and foot (T, 4): of the ankle, world; motions: joints' places (T, J, 3) m of the new and the old one.

@@ -2,8 +2,8 @@
 
 Rigs rest in all kinds of poses and turn about all kinds of axes. Here any humanoid's motion is written on a skeleton
 whose joints, at rest, have the world's axes (X forward, Y left, Z up) in a T-pose: thumbs forward, palms down, knees
-and elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The turn of a hand about
-its forearm is the forearm's, as radius and ulna do it. Joints keep their places but for those of no meaning.
+and elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The turn of a
+hand about its forearm is the forearm's, as radius and ulna do it. Joints keep their places but for those of no meaning.
 """
 
 from __future__ import annotations

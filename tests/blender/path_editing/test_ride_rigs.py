@@ -237,7 +237,8 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     rig, scene = bpy.data.objects["Rig"], bpy.context.scene
-    assert part("path_editing.live").follow(scene) == 1 and rig.beyond_mocap_ride.told == ""  # the original is looked at again
+    assert part("path_editing.live").follow(scene) == 1  # the original is looked at again
+    assert rig.beyond_mocap_ride.told == ""
     np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
     rig.beyond_mocap_ride.curve.location.z += 0.5
     bpy.context.view_layer.update()

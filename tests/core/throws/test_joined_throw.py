@@ -112,7 +112,7 @@ def test_a_key_moment_within_the_throw_by_its_solved_touch_gives_way_too(library
 
 
 def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
-    # the adult of `motion.retargeting.adult` is not the library's skeleton: the way there is found on the library's bones
+    # `adult_skeleton` is not the library's skeleton: the way there is found on the library's bones
     motion = released_over(made, np.zeros(2))
     way = construct_run_up(library, going(0.0), motion, made.release, AT)
     assert way.motion.skeleton.names == motion.skeleton.names

@@ -1,8 +1,9 @@
 """A part of the body brought to a ball that stays where it is: the ball's flight is given, the body meets it.
 
-`synthesis.construct.ball.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by the shortest way
-that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by bending the
-spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and its landing.
+`synthesis.construct.ball.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
+the shortest way that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by
+bending the spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and
+its landing.
 """
 
 from __future__ import annotations
