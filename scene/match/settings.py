@@ -48,7 +48,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     position: StringProperty(name="Position", description="Where he plays, where the feed tells")
 
 
-@with_settings("match.section", "match.pieces.work", "match")
+@with_settings("match.section", "match.work", "match")
 class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 

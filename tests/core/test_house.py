@@ -211,7 +211,7 @@ def test_one_version_everywhere():
 
 
 def test_links_in_the_docs_lead_somewhere():
-    pages = [TOP / "README.md", *sorted((TOP / "docs").rglob("*.md"))]
+    pages = [*TOP.glob("*.md"), *sorted((TOP / "docs").rglob("*.md"))]
     links = [(page, link) for page in pages for link in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8"))]
     assert links
     assert [
