@@ -133,9 +133,10 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
     for name, one, own, flies in zip(names, mended, rows, flying):
         if flies:
             ends.append(landings.completed(one.motion, own, one.standing, ways))
-            clips.append(Clip(name, False, ends[-1].motion, ends[-1].rows, ends[-1].standing, ends[-1].recorded))
+            clips.append(Clip(path=name, mirrored=False, motion=ends[-1].motion, annotations=ends[-1].rows,
+                              standing=ends[-1].standing, recorded=ends[-1].recorded))
         else:
-            clips.append(Clip(name, False, one.motion, own, one.standing))
+            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
     notes += landings.told(ends, ways)
     return clips
 
@@ -175,7 +176,8 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
         _check(cancelled)
         report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
         clusters[length] = cluster_blocks(frames, length, seed)
-    return Library(folder, clips[0].motion.skeleton, clips, frames, clusters, FPS, notes)
+    return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=frames, clusters=clusters,
+                   fps=FPS, notes=notes)
 
 
 def _check(cancelled) -> None:

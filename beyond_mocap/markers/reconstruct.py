@@ -30,7 +30,7 @@ _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model 
 Progress = Callable[[float, str], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ReconstructSettings:
     """What may be chosen; the settings table says what each means. marker_set: None: the shipped set that fits.
     release: "auto": looked for where a marker is on a ball, or the file's name tells a throw's speed."""
@@ -57,7 +57,7 @@ class ReconstructSettings:
             raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Reconstruction:
     """What came out.
 
@@ -144,10 +144,9 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
         motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
     with road.step("release", 1.0):
         found = _release(seen, motion, model, marker_set, settings, road)
-    return Reconstruction(
-        motion, model, tidy, trial, solved, cleaned, found, held, floor, settings.floor, road.seconds,
-        tuple(road.warnings),
-    )
+    return Reconstruction(motion=motion, model=model, trial=tidy, raw=trial, solved=solved, cleaned=cleaned,
+                          release=found, held=held, floor=floor, grounded=settings.floor, seconds=road.seconds,
+                          warnings=tuple(road.warnings))
 
 
 class _Road:
@@ -299,7 +298,8 @@ def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _
         return solved
     hand = f"{found.side.capitalize()}Hand"
     held = np.arange(len(trial)) < found.frame
-    ball = HeldBall(hand, found.centre, found.radius, trial.positions[:, trial.index(label)], held)
+    ball = HeldBall(joint=hand, centre=found.centre, radius=found.radius, seen=trial.positions[:, trial.index(label)],
+                    held=held)
     return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
 
 

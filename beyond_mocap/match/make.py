@@ -55,7 +55,7 @@ class MadePlayer:
     reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MatchResult:
     """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for
     people."""
@@ -96,7 +96,8 @@ def make_match(
         state.told["notes"] += folder.notes
         state.seconds["read"] = round(read[0] - clock[0], 3)
         state.took("library", read)
-        job = stages.Job(order, folder, state, source, library, place, report, cancelled)
+        job = stages.Job(order=order, folder=folder, state=state, source=source, library=library, place=place,
+                         report=report, cancelled=cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads add up in another order
                 _make(job, match, events, span, report)
@@ -234,7 +235,8 @@ def result_of(order: MatchOrder) -> MatchResult:
     made = {status: tuple(MadePlayer(row["id"], row.get("reason", "")) for row in told["players"]
                           if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
     notes = tuple(dict.fromkeys((*told["data"], *told["notes"])))
-    return MatchResult(order, (told["from_s"], told["to_s"]), made["done"], made["failed"], notes)
+    return MatchResult(order=order, span=(told["from_s"], told["to_s"]), done=made["done"], failed=made["failed"],
+                       notes=notes)
 
 
 def _part(report: Progress, stage: str) -> Progress:

@@ -295,7 +295,7 @@ def _edit(row, where: str, array) -> NamedEdit:
     if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
         raise InputError(f"{where}: first, rate", "more than any clip has", f"frames to {_MOST_FRAMES:g}")
     keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
-    return NamedEdit(clips, **runs, keys=keys)
+    return NamedEdit(clips=clips, **runs, keys=keys)
 
 
 def _named_key(value, clips: int, where: str) -> NamedKey:
@@ -303,4 +303,5 @@ def _named_key(value, clips: int, where: str) -> NamedKey:
     if not 0 <= whole_number(clip, where) < clips:
         raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
     frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(number(time, where), whole_number(clip, where), frame, start, end, _words(words, where))
+    return NamedKey(time=number(time, where), clip=whole_number(clip, where), frame=frame, start=start, end=end,
+                    words=_words(words, where))

@@ -203,7 +203,8 @@ class _Body:
                 words[frame] = None
         allowed = np.ones(len(library.clips), bool)
         avoided = tuple(strikes for _ in words) if strikes else ()
-        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, (), avoided)
+        return Wanted(track=track, asked=tuple(words), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed,
+                      warnings=(), avoided=avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
         order = hit.order
@@ -211,7 +212,8 @@ class _Body:
         frames = range(int(hit.first), int(hit.last) + 1)
         words = frozenset({_PART_LABELS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
         key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, words)
-        return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
+        return WantedKey(asked=KeyMoment(order.time, tuple(sorted(words))), frame=frame, choices=(key,),
+                         used_instead=None, ball_height_known=True, rates=(1.0,))
 
     def _track(self, times: np.ndarray, fps: float):
         """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""

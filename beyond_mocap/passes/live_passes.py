@@ -56,7 +56,7 @@ class Played:
         return Stance(tuple(float(v) for v in one.root_positions[0, :2]), float(heading(one)[0]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Rally:
     """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does;
     ball: its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes:
@@ -83,7 +83,7 @@ class Rally:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Piece:
     """One pass from standing to standing, its own clock from 0. motions: of giver and receiver; ball; strike: s;
     seconds: until the next can act; clip: which recording of the library the giver shows; warnings."""
@@ -116,7 +116,7 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
             library, stance, (), ball, radius, None, scene.fps, _settings(scene), cancelled=cancelled
         )
         players[player.name] = Played(start, _lasting(moved.take.motion))
-    return Rally(scene, holder, players, _on_from(None, ball, start), start, start)
+    return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
 
 
 def answer(
@@ -159,7 +159,8 @@ def answer(
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _STOPPED
-    return Piece(one.giver, target, motions, path, strikes[0].order.time, seconds, clip, plan.warnings)
+    return Piece(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
+                 seconds=seconds, clip=clip, warnings=plan.warnings)
 
 
 def _settings(scene: PassScene) -> BodySettings:

@@ -63,7 +63,7 @@ class _Options:
         return quaternion.rotate(quaternion.about_up(self.facing), self.moments.struck.velocity)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Tried:
     """Flights (N) of a strike: from which option, starts (N, 3), target (3,), seconds, velocity (N, 3); cost (N,),
     infinite where it cannot be; reached: whether any comes to the target at all, net or no net."""
@@ -155,7 +155,8 @@ def _possible(court: Court, number: int, site: Site) -> StrikeMoments:
 
 def _simplest(options: _Options) -> Link:
     best = int(np.argmin(options.cost))
-    return Link(options.moments.only([best]), float(options.facing[best]), 0.0, np.zeros(3), options.natural)
+    return Link(moment=options.moments.only([best]), facing=float(options.facing[best]), seconds=0.0,
+                velocity=np.zeros(3), natural=options.natural)
 
 
 def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
@@ -171,10 +172,9 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     best = int(np.argmin(tried.cost))
     option = int(tried.option[best])
     chosen = int(np.argmin(np.linalg.norm(options.natural.starts - tried.starts[best], axis=1)))
-    return Link(
-        options.moments.only([option]), float(options.facing[option]), float(tried.seconds[best]), tried.velocity[best],
-        replace(options.natural, chosen=chosen),
-    )  # fmt: skip
+    return Link(moment=options.moments.only([option]), facing=float(options.facing[option]),
+                seconds=float(tried.seconds[best]), velocity=tried.velocity[best],
+                natural=replace(options.natural, chosen=chosen))  # fmt: skip
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what is not possible may be faster than numbers go
@@ -198,7 +198,8 @@ def _tried(
     cost += rising(arriving) + lasting(seconds, site.kind)
     good = aimed.possible & (aimed.miss <= ON_TARGET)
     cost = np.where(good & court.clear(ways), cost, np.inf)
-    return _Tried(option, starts, target, seconds, aimed.velocity, cost, bool(good.any()))
+    return _Tried(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
+                  reached=bool(good.any()))
 
 
 def _pushes(site: Site, link: Link) -> np.ndarray:

@@ -29,7 +29,7 @@ NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
 """Frames by which a flight may be longer or shorter than was best, where places have moved."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Flown:
     """The flights of K strikes. serve: the ball's launch before the first. places, normals (K, 3): the ball's at each
     strike, m, and the way from part to ball. arriving (K, 3), leaving (K-1, 3) m/s and spin (K-1, 3) rad/s of the
@@ -62,7 +62,8 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
     leaving, spin, missed = _between(court, chain, places, last=True)
     serve, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)
     normals = unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving)
-    return chain, Flown(serve, places, normals, arriving, leaving, spin, missed)
+    return chain, Flown(serve=serve, places=places, normals=normals, arriving=arriving, leaving=leaving, spin=spin,
+                        missed=missed)
 
 
 def _laid(court: Court, chain: Sequence[Link], normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -61,7 +61,7 @@ class PlayerPasses:
     moved: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Passes:
     """A passing scene as it is played. plan: strikes and flights; ball: its path, kind the ball; players in the scene's
     order; warnings: what could not be kept."""
@@ -102,7 +102,8 @@ def passes(
     told = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
     moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
     report(1.0, "Done")
-    return Passes(scene, ball_of(scene), plan, path, moved, (*plan.warnings, *_taken(library, plan), *told))
+    return Passes(scene=scene, kind=ball_of(scene), plan=plan, ball=path, players=moved,
+                  warnings=(*plan.warnings, *_taken(library, plan), *told))
 
 
 def _taken(library: Library, plan: PassPlan) -> list[str]:
@@ -233,7 +234,8 @@ class _Reach:
             moments = self._reached(part, side, tool and tool.for_body(size), size, kind, example)
         except InputError as error:
             raise InputError(f"pass {number}, {name}", str(error)) from None
-        return Site(name, place, self.scene.facing(name), kind, part, tool, size, moments, one)
+        return Site(player=name, place=place, facing=self.scene.facing(name), kind=kind, part=part, tool=tool,
+                    size=size, moments=moments, asked=one)
 
     def _reached(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
         key = (part, side, tool, size, kind, example)

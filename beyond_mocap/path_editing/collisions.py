@@ -19,7 +19,7 @@ DISTANCE = 0.6
 _JUMP = 15.0  # m/s: nobody runs like that; such a step is a motion that starts again somewhere else
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Collision:
     """Two bodies nearer than the distance asked for, without a break.
 
@@ -91,8 +91,8 @@ def _joined(pair, steps, enter, leave, nearest, gap, times, places):
         step, share = steps[best], nearest[best]
         both = places[pair, step] * (1 - share) + places[pair, step + 1] * share
         when = times[step] + share * (times[step + 1] - times[step])
-        found.append(Collision(int(pair[0]), int(pair[1]), float(span[0]), float(span[1]), float(when),
-                               float(gap[best]), tuple(map(float, both.mean(axis=0)))))
+        found.append(Collision(first=int(pair[0]), second=int(pair[1]), start=float(span[0]), end=float(span[1]),
+                               time=float(when), gap=float(gap[best]), place=tuple(map(float, both.mean(axis=0)))))
     return found
 
 

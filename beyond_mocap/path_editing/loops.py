@@ -36,7 +36,7 @@ _JOINTS = 16  # compared at most, of a body that is not a human one
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Loop:
     """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
 
@@ -251,7 +251,8 @@ def _exact(
     off = float(apart[at])
     ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
     usual = max(usual, 1e-9)
-    return Loop(first, last, off, off / usual, float(cost[at]), metres, (last - first) / stride, ending / usual)
+    return Loop(start=first, end=last, apart=off, unlike=off / usual, cost=float(cost[at]), metres=metres,
+                strides=(last - first) / stride, ending=ending / usual)
 
 
 def _soles_apart(

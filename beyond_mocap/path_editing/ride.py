@@ -56,7 +56,7 @@ STILL = 0.05
 """Metres of path below which a motion stands still."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RideSettings:
     """What a user chooses; the settings table says what each means.
     detours: (arc m, width m, offset m to the left) each."""
@@ -88,7 +88,7 @@ class RideSettings:
             raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RideSource:
     """A motion relative to its own path: all that does not depend on the new one.
 
@@ -126,7 +126,7 @@ class RideSource:
         return curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Ridden:
     """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
     carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,):
@@ -197,9 +197,9 @@ def prepare(
         under=under, up=up, fps=motion.fps, skeleton=motion.skeleton,
     )  # fmt: skip
     sole = contacts.recorded_floor(motion)[1] if humanoid else 0.0
-    return RideSource(
-        motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, sole, told
-    )
+    return RideSource(motion=motion, standing=residuals.standing, path=path, arc=arc, moving=moving,
+                      residuals=residuals, frame=settings.frame, humanoid=humanoid, still=still, sole=sole,
+                      warnings=told)
 
 
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
@@ -234,10 +234,9 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
-    ridden = Ridden(
-        motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, laid, source,
-        (*source.warnings, *end.told), end.again,
-    )  # fmt: skip
+    ridden = Ridden(motion=motion, frames=rows.frames, standing=rows.standing, arc=timing.arc, origin=origin,
+                    heading=moving.heading, seams=seams, correction=correction, miss=miss, laid=laid, source=source,
+                    warnings=(*source.warnings, *end.told), again=end.again)  # fmt: skip
     return _begun_again(ridden, end) if len(end.again) else ridden
 
 

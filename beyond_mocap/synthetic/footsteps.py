@@ -21,7 +21,7 @@ _TOE_LIFTS = np.radians(42.0)
 _FULL_STEP = 0.55
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Footsteps:
     """The K stances of one foot in order of time.
 

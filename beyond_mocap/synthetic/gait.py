@@ -100,7 +100,7 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
     place = place - _lean_shift(course, neutral, middle)
     toe_out = sign * (np.radians(at_speed("toe_out", gear)) + style.toe_out)
     on, off = _within_reach(course, place, on, off, neutral.leg)
-    return Footsteps(side, on, off, place, heading + toe_out, gear, direction)
+    return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=gear, direction=direction)
 
 
 def _within_reach(

@@ -41,7 +41,7 @@ class Gesture:
     end: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Strike:
     """How the right foot meets the ball and what the body does meanwhile; seconds from the touch, metres, degrees.
 

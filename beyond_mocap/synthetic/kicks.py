@@ -36,7 +36,7 @@ _TOES_UP = 0.35  # radians that the toes are bent up at the contact
 _FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s, between which the leg leaves the ground, comes back to it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class KickStyle:
     """How a right foot kicks towards +X; seconds from the contact, degrees, metres of an adult.
 

@@ -204,9 +204,8 @@ def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves)
     places = np.array(places + places[-1:])
     count = len(on)
     yaw = np.full(count, sign * np.radians(tables.at_speed("toe_out", 0.3)))
-    return Footsteps(
-        side, on, off, np.stack([places, np.full(count, left)], -1), yaw, np.full(count, 1.2), np.zeros(count)
-    )
+    return Footsteps(side=side, on=on, off=off, place=np.stack([places, np.full(count, left)], -1), yaw=yaw,
+                     speed=np.full(count, 1.2), direction=np.zeros(count))
 
 
 # seconds from the beginning; hips ahead, height; tilt of pelvis, spine, head; ankles ahead (left, right), height; foot

@@ -57,7 +57,7 @@ class Freedom:
         return cls(0.0, 0.0, 0.02, False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Corrected:
     """A motion whose ball hits.
 
@@ -338,10 +338,9 @@ class _Search:
         there, _, _ = self._arrives(points, velocities, none, none, rest, np.array([change.seconds]))
         end = self.part.chain(now)[2]
         shift = forward_kinematics(now)[0][:, end] - forward_kinematics(before)[0][:, end]
-        return Corrected(
-            now, frame, position[0], velocity[0], spin[0], change.seconds,
-            float(np.linalg.norm(there[0] - self.target)), float(np.linalg.norm(shift, axis=-1).max()), shift,
-            change.turn, 1.0 + change.pace, (source - self.asked) / self.given.fps / (1.0 + change.pace),
-            float(np.linalg.norm(change.rest)) if self.walks else 0.0,
-            float(np.abs(gap).max(initial=0.0)),
-        )  # fmt: skip
+        return Corrected(motion=now, frame=frame, position=position[0], velocity=velocity[0], spin=spin[0],
+                         seconds=change.seconds, miss=float(np.linalg.norm(there[0] - self.target)),
+                         moved=float(np.linalg.norm(shift, axis=-1).max()), shift=shift, turned=change.turn,
+                         pace=1.0 + change.pace, later=(source - self.asked) / self.given.fps / (1.0 + change.pace),
+                         elsewhere=float(np.linalg.norm(change.rest)) if self.walks else 0.0,
+                         gap=float(np.abs(gap).max(initial=0.0)))  # fmt: skip

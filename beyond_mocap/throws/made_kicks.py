@@ -36,7 +36,7 @@ _ROUNDS = 6
 _HIT = 0.01  # m, near enough
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Kick:
     """A made kick.
 
@@ -130,7 +130,8 @@ class _Aim:
             )
         motion = kicked(self.style, self.neutral, self.foot, way[0], way[1], rate, turn, fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
-        return Kick(place(motion, 0.0, back), BEFORE / rate, self.foot, start, *spun)
+        return Kick(motion=place(motion, 0.0, back), contact=BEFORE / rate, foot=self.foot, ball=start,
+                    velocity=spun[0], spin=spun[1])
 
 
 def _slopes(ends: np.ndarray) -> np.ndarray:

@@ -145,7 +145,8 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
     frames = np.arange(wish.first, wish.last + 1)
     if wish.body is None:
         there = np.array([wish.place])
-        return Strikes(frames[:1], there, there, -BALLS[wish.ball].radius, np.zeros((1, 3)))
+        return Strikes(frames=frames[:1], start=there, end=there, radius=-BALLS[wish.ball].radius,
+                       velocity=np.zeros((1, 3)))
     key = (wish.body.session_uid, wish.part, wish.side, wish.bone, wish.first, wish.last, frames_per_second(scene))
     if key not in _strikes:
         motion, first = motion_of(scene, wish.body)

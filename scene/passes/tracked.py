@@ -87,8 +87,9 @@ def together(named: tuple):
     height = np.where(first.ball_height_known, first.ball[:, 2], np.nan)
     players = tuple(MatchPlayer(name, "", name, -1) for name, _ in named)
     fps = 1.0 / float(np.median(np.diff(times)))
-    return Match(times, players, places, np.column_stack([first.ball[:, :2], height]), *PITCH, fps, "csv",
-                 ((float(times[0]), float(times[-1])),))
+    samples = np.column_stack([first.ball[:, :2], height])
+    return Match(times=times, players=players, positions=places, ball=samples, length=PITCH[0], width=PITCH[1], fps=fps,
+                 provider="csv", periods=((float(times[0]), float(times[-1])),))
 
 
 def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:

@@ -50,8 +50,9 @@ class Trial:
         times = (self.first + np.arange(len(ridden.motion))) / fps
         places = np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]])
         if not may_change:
-            return Follower(self.name, times, places)
-        return Follower(self.name, times, places, self.path, ridden.arc, self.settings.by_arc_length)
+            return Follower(name=self.name, times=times, places=places)
+        return Follower(name=self.name, times=times, places=places, path=self.path, arc=ridden.arc,
+                        by_arc=self.settings.by_arc_length)
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ _SKIPPED = 40.0  # nats for a second left out so
 _SHORT, _SHORT_PRICE = 0.24, 6.0  # s within which the course hardly changes twice, nats for twice at once
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Cuts:
     """The cuts that remain, in order, C of them, and the C + 1 pieces around them.
 
@@ -99,7 +99,7 @@ def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(left), np.concatenate(right)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Knots:
     time: np.ndarray
     spread: np.ndarray
@@ -137,7 +137,8 @@ def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> 
     free = FREE + _NEAR * np.exp(-near) + joint + _free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
-    return _Knots(time, np.minimum(spread, step), place, before, after, touch, free)
+    return _Knots(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after, touch=touch,
+                  free=free)
 
 
 def _usual(times: np.ndarray) -> float:

@@ -26,7 +26,7 @@ _EXPORT_AGAIN = "export the file again"
 _DAMAGED = f"the file is cut off or damaged; {_EXPORT_AGAIN}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BvhText:
     """A file's content. J joints, parents before children; file units, file axes, degrees.
 
@@ -130,17 +130,17 @@ class _Hierarchy:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
-            self.path,
-            tuple(self.names),
-            tuple(self.parents),
-            np.array(self.offsets),
-            tuple(self.channels),
-            tuple(joint for joint, _ in ends),
-            np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time,
-            values,
-            first_row,
-            tuple(self.renamed),
+            path=self.path,
+            names=tuple(self.names),
+            parents=tuple(self.parents),
+            offsets=np.array(self.offsets),
+            channels=tuple(self.channels),
+            end_parents=tuple(joint for joint, _ in ends),
+            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3),
+            frame_time=frame_time,
+            values=values,
+            first_row=first_row,
+            renamed=tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:

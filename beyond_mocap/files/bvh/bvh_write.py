@@ -20,7 +20,7 @@ _SAME_PLACE = 1e-4  # centimetres
 _SAME_ANGLE = np.degrees(1e-6)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Joint:
     """A joint as it is to stand in the file, centimetres and degrees, Y up.
 
@@ -92,7 +92,8 @@ def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, 
     ]
     offset = places[0] if len(places) == 1 else np.where([c in channels for c in POSITIONS], 0.0, places[0])
     columns = np.stack(columns, axis=1) if columns else np.zeros((frames, 0))
-    return _Joint(name, depth, offset, channels, columns, _to_file(ends), tuple(lacking))
+    return _Joint(name=name, depth=depth, offset=offset, channels=channels, columns=columns, ends=_to_file(ends),
+                  added=tuple(lacking))
 
 
 def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:

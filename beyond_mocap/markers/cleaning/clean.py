@@ -29,7 +29,7 @@ _STRAYED, _FOR = 1.5, 0.1
 _NEAR_BREAK = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CleanSettings:
     """What the clean-up does. longest_gap, longest_soft_gap, longest_spline: seconds up to which a gap is filled by
     markers that carry the missing one firmly, softly, and by a curve alone; 0 fills none that way."""
@@ -97,7 +97,8 @@ class _Work:
         """The stretch of these markers' frames, in seconds."""
         clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
         names = tuple(self.trial.labels[i] for i in labels)
-        return Stretch(names, float(clock[0]), float(clock[1]), frames or end - first, how, float(off))
+        return Stretch(labels=names, start=float(clock[0]), end=float(clock[1]), frames=frames or end - first, how=how,
+                       off=float(off))
 
 
 def clean(

@@ -32,7 +32,7 @@ _STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its pl
 _UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Centres:
     """What one frame tells about a body.
 
@@ -61,7 +61,7 @@ def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
     cannot be told.
     """
     points = {name: np.asarray(place, dtype=float) for name, place in points.items() if np.isfinite(place).all()}
-    out = Centres(body_size(points))
+    out = Centres(size=body_size(points))
     _pelvis(out, points)
     if any(LANDMARK_PLACES[name][0] == "Chest" for name in points):
         _thorax(out, points)

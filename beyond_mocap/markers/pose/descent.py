@@ -23,7 +23,7 @@ _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
 _BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HeldPoint:
     """A point of a joint's body that stands at a given distance from a seen point: a ball's centre in the hand, from a
     marker on the ball.
@@ -42,7 +42,7 @@ class HeldPoint:
         return replace(self, seen=self.seen[:, chosen], weight=self.weight[chosen])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Task:
     """What F poses are to come near to.
 

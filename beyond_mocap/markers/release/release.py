@@ -64,7 +64,7 @@ class ReleaseSettings:
     centre: tuple[float, float, float] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Release:
     """How the ball left.
 
@@ -208,7 +208,7 @@ def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
     return float(np.linalg.norm(found.launch.position - palm[k]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Found:
     """A launch, in the markers' space, and how sure it is."""
 
@@ -232,12 +232,12 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     way = fly(launch, found.ball, _LONGEST, ground)
     impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
-    return Release(
-        launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,
-        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, found.way_sigma, hand.side,
-        found.how, found.residual, found.frames, radar_speed(name), lies.centre, lies.radius,
-        BallPath(hand.times, places, seen), impact, hips, tuple(notes),
-    )  # fmt: skip
+    return Release(time=launch.time, frame=int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)),
+                   position=launch.position, velocity=launch.velocity, spin=np.asarray(launch.spin, float),
+                   time_sigma=found.time_sigma, speed_sigma=found.speed_sigma, way_sigma=found.way_sigma,
+                   side=hand.side, how=found.how, residual=found.residual, flight_frames=found.frames,
+                   radar=radar_speed(name), centre=lies.centre, radius=lies.radius,
+                   path=BallPath(hand.times, places, seen), impact=impact, hips=hips, notes=tuple(notes))  # fmt: skip
 
 
 def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
@@ -350,7 +350,8 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _Found(launch, ball, "ball", fit.time_sigma, speed_sigma, way_sigma, fit.residual, fit.frames, fit.circle)
+    return _Found(launch=launch, ball=ball, how="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
+                  way_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
 def _without_air(ball: Ball) -> Ball:
@@ -363,7 +364,8 @@ def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _
     if not hand.markers:
         notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
     launch = Launch(found.time, found.position, found.velocity)
-    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma, found.way_sigma)
+    return _Found(launch=launch, ball=ball, how="hand", time_sigma=found.time_sigma, speed_sigma=found.speed_sigma,
+                  way_sigma=found.way_sigma)
 
 
 def _stride(motion: Motion) -> np.ndarray:

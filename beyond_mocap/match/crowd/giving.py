@@ -35,7 +35,7 @@ _UPRIGHT = 0.35  # least share of a push that goes over the ground
 _HELD = 1e6  # weight that holds a value: far above all others
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Calm:
     """What keeps a body's curves small and smooth, whatever its contacts: the squares of its root and feet and of each
     arm, over the frames low .. low + count in which it is there."""
@@ -58,7 +58,7 @@ class Calm:
                 values = curves[low:high, ARMS.start + 3 * side + axis]
                 _calm(arms[side], axis, ARM_STAY, ARM_SECONDS, body.firm[low:high], fps)
                 _hold(arms[side], axis, values, held)
-        return cls(body, low, high - low, whole, tuple(arms))
+        return cls(body=body, low=low, count=high - low, root_and_feet=whole, arms=tuple(arms))
 
 
 def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:

@@ -23,7 +23,7 @@ _SOFT = 0.003
 _X, _Y, _Z = np.eye(3)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Posture:
     """T frames of a body, metres and radians, world Z up.
 

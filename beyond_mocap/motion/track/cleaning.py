@@ -32,7 +32,7 @@ _LEAN = 0.3  # seconds whose slope is the velocity next to a gap
 _LONGEST_GAP = 3600.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DataReport:
     """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
     rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,

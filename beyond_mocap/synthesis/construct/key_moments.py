@@ -38,7 +38,8 @@ def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, pla
         shown = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
+    return KeyResult(asked=key.asked, frame=at, clip=source.path, clip_frame=shown, mirrored=source.mirrored,
+                     words=words, used_instead=instead)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

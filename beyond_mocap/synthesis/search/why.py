@@ -63,7 +63,7 @@ class Other:
     more: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reason:
     """One uncut piece. first, end: frames at the library's rate. clip: index in the library. path, mirrored; shown:
     first and last frame in the clip's own rate; rate: played / recorded speed. costs: part -> what it cost over the
@@ -143,7 +143,7 @@ def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Way:
     """What was chosen, slot by slot: edges (S + 1,); clip, start, rate, piece (S,), as `path_search.States` has
     them."""
@@ -166,7 +166,7 @@ def _way_of(search: PathSearch, edit: EditList) -> _Way:
     one = frame[later] - frame[low]
     alone = later == low
     rate = np.where(alone, 1.0, one)
-    return _Way(edges, edit.clip[low], frame[low], rate, piece_at[low])
+    return _Way(edges=edges, clip=edit.clip[low], start=frame[low], rate=rate, piece=piece_at[low])
 
 
 def _put_back(search: PathSearch, edit: EditList, placed, frame: np.ndarray, piece_at: np.ndarray) -> None:
@@ -267,8 +267,8 @@ def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam,
     shown = (edit.frame[[first, end - 1]] - library.frames.first[edit.clip[first]]) * own
     rate = (edit.frame[end - 1] - edit.frame[first]) / (end - 1 - first) if end - first > 1 else 1.0
     return Reason(
-        first, end, int(edit.clip[first]), clip.path, clip.mirrored, (float(shown[0]), float(shown[1])), float(rate),
-        costs, seam, others,
+        first=first, end=end, clip=int(edit.clip[first]), path=clip.path, mirrored=clip.mirrored,
+        shown=(float(shown[0]), float(shown[1])), rate=float(rate), costs=costs, seam=seam, others=others,
     )  # fmt: skip
 
 

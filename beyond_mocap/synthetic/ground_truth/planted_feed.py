@@ -12,7 +12,7 @@ _SLOW = 0.4  # seconds over which the ball's error hangs together
 _PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # the players' errors: seconds, metres; metres between samples
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Feed:
     """N samples. times (N,) s. ball (N, 3) m, z NaN where there are no heights. positions (P, N, 2) m of players `ids`
     in `teams`. filled, wrong (N,) bool: made at constant velocity, put elsewhere. length, width of the pitch, m."""
@@ -50,7 +50,8 @@ def sampled(
     seen = players + _slow_noise(rng, players.shape, _PLAYERS_SLOW * fps, _PLAYERS_NOISE, axis=1)
     seen += rng.normal(0.0, _JITTER, seen.shape)
     teams = tuple(TEAMS[i // 11] for i in range(len(match.ids)))
-    return Feed(times, measured.round(2), seen.round(2), match.ids, teams, made, wrong & ~made, fps)
+    return Feed(times=times, ball=measured.round(2), positions=seen.round(2), ids=match.ids, teams=teams, filled=made,
+                wrong=wrong & ~made, fps=fps)
 
 
 def _slow_noise(rng, shape, samples: float, size: float, axis: int = 0) -> np.ndarray:

@@ -137,7 +137,7 @@ STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}
 """Markers that come off after the static trial."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Placed:
     """Markers on a skeleton: labels (M), their joints (M,), places (M, 3) metres in the joint's axes, and how soft the
     skin under them is: soft (M,) metres a radian, wobble (M,)."""
@@ -161,10 +161,9 @@ def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: floa
             continue
         place, side = found
         rows.append((label, skeleton.index(side + place.on), _at(skeleton, label, place, side, size) + shift, place))
-    return Placed(
-        tuple(row[0] for row in rows), np.array([row[1] for row in rows], int), np.array([row[2] for row in rows]),
-        np.array([row[3].soft for row in rows]) * 1e-3, np.array([row[3].wobble for row in rows]),
-    )
+    return Placed(labels=tuple(row[0] for row in rows), joint=np.array([row[1] for row in rows], int),
+                  places=np.array([row[2] for row in rows]), soft=np.array([row[3].soft for row in rows]) * 1e-3,
+                  wobble=np.array([row[3].wobble for row in rows]))
 
 
 def _place(label: str, blades: bool) -> tuple[Place, str] | None:

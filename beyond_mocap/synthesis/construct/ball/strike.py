@@ -134,7 +134,7 @@ def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: floa
     return replace(touch, frame=float(first + later), entry=touch.entry + later, leave=touch.leave - later)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Moment:
     """A touch in frames: the nearest one; the two around it, in which it is held; low and high, at which the body is as
     it was; bounds, the held frames of the touches before and after."""
@@ -158,7 +158,8 @@ def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: floa
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _Moment(frozenset(touch.words), _nearest(frame, count), held[place], low, high, (before, after))
+        yield number, _Moment(words=frozenset(touch.words), frame=_nearest(frame, count), held=held[place], low=low,
+                              high=high, bounds=(before, after))
 
 
 def _nearest(frame: float, count: int) -> int:
@@ -174,7 +175,7 @@ def held_frames(frame: float, count: int) -> tuple[int, int]:
     return int(np.clip(np.floor(frame), 0, count - 1)), int(np.clip(np.ceil(frame), 0, count - 1))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Scene:
     """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
     and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the
@@ -227,7 +228,8 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
         path = lofted(path, moment.frame, float(height), ~height_known, fps)
     ahead = _direction(body, parts[0], moment, at, path, fps)
     avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
-    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), avoid, origin)
+    scene = _Scene(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead), avoid=avoid,
+                   origin=origin)
     if len(parts) == 2:
         return scene
     def possible(need: np.ndarray) -> np.ndarray:
