@@ -71,7 +71,7 @@ def aim(
     start, target, spin may be (3,): the same for all. Starts and targets lower than a ball can lie are set onto the
     ground. InputError: numbers that cannot be meant.
     """
-    problem = _Problem.of(start, target, ball, seconds, bounces, spin, ground)
+    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft, about))
     velocity, miss = _solved(problem, near)
@@ -99,7 +99,7 @@ def along_ground(
     seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
     InputError as `aim`.
     """
-    problem = _Problem.of(start, target, ball, seconds, 0, None, ground)
+    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
     low = ground + ball.radius
     problem.start[:, 2], problem.target[:, 2] = low, low
     way = problem.target - problem.start

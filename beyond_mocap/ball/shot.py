@@ -98,13 +98,14 @@ def shoot(
         if length(starts - target).min() < ball.radius:
             raise InputError(what, "the target is where the ball is struck", "a target some way off", "move the target")
         aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
-            aim(starts, target, ball, seconds, bounces, spin, fastest, launch, about=about)
+            aim(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, near=launch,
+                about=about)
         towards, launch, about = aimed.velocity, aimed.velocity, aimed.seconds
     if ground:
         starts[:, 2] = ball.radius
     if not aimed.possible.any():
         best = int(np.argmin(np.where(aimed.miss <= CLOSE, length(aimed.velocity), np.inf)))
-        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, best, fastest, what)
+        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, index=best, fastest=fastest, what=what)
     return Shot(strikes.frames, starts, aimed, _chosen(strikes, aimed))
 
 

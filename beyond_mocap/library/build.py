@@ -60,8 +60,9 @@ def build(
             found["notes"] += tuple(waiting)
             return Library(folder=str(folder), kept=(place, key), **found)
     notes: list[str] = [where] if where else []
-    clips = _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled)
-    built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
+    clips = _read_clips(folder, paths, files, annotations=annotations, chosen=chosen, unit=unit, threads=threads,
+                        notes=notes, report=report, cancelled=cancelled)
+    built = _index(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
     write_synthetic_clips(place, _completed(built.clips))
     if not cache.save(place, key, built):
         told = (
@@ -80,7 +81,7 @@ def _completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
-    read, unpopped, level = zip(*_read_files(paths, files, unit, threads, report, cancelled))
+    read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
     notes += _unit_notes(read)
     carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
     mended, rows = [], []

@@ -162,9 +162,8 @@ def slides(motion: Motion, standing: np.ndarray) -> bool:
 def held(motion: Motion, standing: np.ndarray) -> Motion:
     """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at the heights they
     have."""
-    planted = plant(
-        motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps, _SINKS, levels=False
-    )
+    planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
+                    sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 

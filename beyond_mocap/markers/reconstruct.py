@@ -114,7 +114,8 @@ def reconstruct(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # the same bits everywhere; and small systems are slower on several
-        return _reconstruct(trial, static, model, settings, _Road(progress, cancelled), cancelled)
+        return _reconstruct(trial, static, model, settings=settings, road=_Road(progress, cancelled),
+                            cancelled=cancelled)
 
 
 def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Road, cancelled) -> Reconstruction:
@@ -134,7 +135,7 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
             model = _calibrated(marker_set, told, still, road.inner(0.1, 0.45), cancelled)
             road.tell(model.notes)
     with road.step("pose", 0.85):
-        solved = _posed(model, told, marker_set, settings, road, cancelled)
+        solved = _posed(model, told, marker_set, settings=settings, road=road, cancelled=cancelled)
         road.tell([*solved.notes, *_far_off(solved, model)])
     with road.step("filter", 0.92):
         motion, held = _filtered(solved, model, seen, settings, road)
@@ -143,7 +144,7 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
         down = floor if settings.floor else 0.0
         motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
     with road.step("release", 1.0):
-        found = _release(seen, motion, model, marker_set, settings, road)
+        found = _release(seen, motion, model, marker_set=marker_set, settings=settings, road=road)
     return Reconstruction(motion=motion, model=model, trial=tidy, raw=trial, solved=solved, cleaned=cleaned,
                           release=found, held=held, floor=floor, grounded=settings.floor, seconds=road.seconds,
                           warnings=tuple(road.warnings))
@@ -292,7 +293,8 @@ def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _
         if settings.hold_ball:
             road.tell(["no marker on a ball: nothing is held"])
         return solved
-    found = _release(trial, solved.motion, model, marker_set, replace(settings, release="auto"), road)
+    found = _release(trial, solved.motion, model, marker_set=marker_set, settings=replace(settings, release="auto"),
+                     road=road)
     if found is None or found.how != "ball":
         road.tell([f"{label} does not tell how the ball is held: it takes no part in the pose"])
         return solved

@@ -85,7 +85,8 @@ def reconstruct_folder(
         if cancelled is not None and cancelled():
             raise Cancelled("cancelled")
         part = _part_of(progress, number, len(plans), plan.recording.name)
-        yield _made(plan, read, settings, model or models.get(plan.static_path), part, cancelled)
+        yield _made(plan, read, settings, model=model or models.get(plan.static_path), progress=part,
+                    cancelled=cancelled)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -183,7 +184,8 @@ def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made
         return Made(recording=plan.recording, made=None, error=plan.error)
     static, still = plan.static or (None, None)
     try:
-        made = reconstruct(read(plan.recording.path), still, model, settings, progress, cancelled)
+        made = reconstruct(read(plan.recording.path), still, model, settings=settings, progress=progress,
+                           cancelled=cancelled)
     except Cancelled:
         raise
     except (BeyondMocapError, OSError) as error:

@@ -166,7 +166,8 @@ def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
     places[:hand], turns[:hand] = old.motion.root_positions[then], old.motion.rotations[then]
     standing = np.repeat(window.standing[at][:, :, None], 2, axis=2)
     root, rotations = take.motion.root_positions.copy(), take.motion.rotations.copy()
-    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share, standing, fps)
+    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share=share, standing=standing,
+                                          fps=fps)
     motion = replace(take.motion, root_positions=root, rotations=rotations)
     return replace(take, motion=motion, ball=_ball_handed(old.ball, take.ball, then, at.start, share[:hand]))
 

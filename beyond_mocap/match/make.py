@@ -145,7 +145,8 @@ def _make(
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
-    parts = parts_of(roles, names, words, solved, job.order, job.folder, job.library.words)
+    parts = parts_of(roles, names, words, solved=solved, order=job.order, folder=job.folder,
+                     known_words=job.library.words)
     told = job.folder.before.get("players", ())
     finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}

@@ -266,7 +266,8 @@ def _track(row, where: str, array) -> Track:
     flags = array("flags", None, len(times)).astype(int)
     known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
     ball = places(array("ball", 3, len(times)), f"{where}: ball")
-    return Track(times, positions, ball, known, filled, outlier, text(row["name"], f"{where}: name"))
+    return Track(times, positions, ball, ball_height_known=known, filled=filled, outlier=outlier,
+                 name=text(row["name"], f"{where}: name"))
 
 
 def _course(row, where: str, array, first: float, last: float) -> SolvedCourse | None:

@@ -133,7 +133,7 @@ def plant(
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
         goals = [
-            _goal(foot, weight, lift, tilt, scale, spread)
+            _goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
             for foot, weight, lift, tilt in zip(feet, firm, lifts, np.moveaxis(moves[..., 3], 1, 0))
         ]
         drop = pelvis_drop(feet, [goal for goal, _ in goals], spread, sinks)

@@ -109,7 +109,8 @@ def player_motion(
     orders = sorted(orders, key=lambda order: order.time)
     _check(orders, ball.times, fps)
     with threadpool_limits(limits=1):
-        return _Body(library, stance, orders, ball, ball_radius, count, fps, settings).made(progress, cancelled)
+        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=count, fps=fps,
+                     settings=settings).made(progress, cancelled)
 
 
 def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) -> float:
@@ -285,7 +286,7 @@ class _Body:
             frame = (order.time - self.start) * self.fps
             entry, leave = (frame - (hit.start - self.start) * self.fps, (hit.end - self.start) * self.fps - frame)
             ball = np.array(order.ball) if order.touches else np.full(3, np.nan)
-            out.append(Meeting(frame, surface, ball, self.ball_radius, entry, leave))
+            out.append(Meeting(frame, surface, ball, radius=self.ball_radius, entry=entry, leave=leave))
         return out
 
     def _warnings(self, struck: Met, track: SampledTrack) -> tuple[str, ...]:

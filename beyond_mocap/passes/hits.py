@@ -122,7 +122,7 @@ def analyse(
     """
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, joint or part, side, tool)
+    place = strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
     side = side if part in _SIDED else ""
     body = _Body.of(motion, positions)
     way = _Way.of(place, body, part, motion.fps)
@@ -154,13 +154,13 @@ def hit_at(
     are fast, as in a trap, of which `analyse` sees nothing. InputError as there."""
     _check(motion, None)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, part, side, tool)
+    place = strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
     body = _Body.of(motion, positions)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _hit_motion(part, side, (first, last), _Way.of(place, body, part, motion.fps), body, key)
+    return _hit_motion(part, side, (first, last), way=_Way.of(place, body, part, motion.fps), body=body, key=key)
 
 
 def strike_place(

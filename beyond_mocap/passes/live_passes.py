@@ -112,9 +112,8 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
         if progress:
             progress(number / len(names), f"{player.name} stands")
         stance = Stance(player.place, scene.facing(player.name))
-        moved = player_motion(
-            library, stance, (), ball, radius, None, scene.fps, _settings(scene), cancelled=cancelled
-        )
+        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, frames=None, fps=scene.fps,
+                              settings=_settings(scene), cancelled=cancelled)
         players[player.name] = Played(start, _lasting(moved.take.motion))
     return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
 
@@ -137,7 +136,7 @@ def answer(
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
     one = Pass(
-        rally.holder, target, kind_of(hit), bounces, hit.part, hit.side, example=Example("", hit=hit)
+        rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side, example=Example("", hit=hit)
     )
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
@@ -146,15 +145,13 @@ def answer(
             for player in rally.scene.players
         ),
     )
-    plan = _planned(library, scene, stances[rally.holder], lies, progress, cancelled)
+    plan = _planned(library, scene, stances[rally.holder], lies=lies, progress=progress, cancelled=cancelled)
     path = ball_path(plan)
     path = replace(path, positions=_rolled(path, lies, plan.strikes[0].order.time))
     motions = {}
     for name in (one.giver, one.receiver):
-        moved = player_motion(
-            library, stances[name], plan.orders(name), path, ball_of(scene).radius, None, scene.fps, _settings(scene),
-            cancelled=cancelled,
-        )
+        moved = player_motion(library, stances[name], plan.orders(name), ball=path, ball_radius=ball_of(scene).radius,
+                              frames=None, fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
         motions[name] = _lasting(moved.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path

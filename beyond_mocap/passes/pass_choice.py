@@ -163,7 +163,7 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all
     times with the best option, then the best times with all."""
     seconds = seconds_of(court.passes[number], court.scene.fps)
-    tried = _tried(court, number, options, after, np.zeros(len(seconds), int), seconds)
+    tried = _tried(court, number, options, after=after, option=np.zeros(len(seconds), int), seconds=seconds)
     best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
     others = np.arange(1, len(options.cost))
     tried = tried.and_also(_tried(court, number, options, after, *_each(others, seconds[best])))
@@ -187,7 +187,8 @@ def _tried(
     starts = options.centres(site, unit_vectors(natural), court.ball.radius)[option]
     target = court.ball_on(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
     spin = spun(starts, target, seconds, court.ball, site.kind)
-    aimed = aim(starts, target, court.ball, seconds, one.bounces, spin, fastest=court.fastest(number))
+    aimed = aim(starts, target, court.ball, seconds=seconds, bounces=one.bounces, spin=spin,
+                fastest=court.fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)
     ways, arriving = ways_of(*flights, court.ball), arrivals(*flights, court.ball)
     cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)

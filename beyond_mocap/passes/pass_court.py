@@ -130,7 +130,8 @@ class Court:
         """The launches (S) of a pass from `start` (S, 3) m to `target` (3,) m that take `seconds` (S,), and whether
         each is what a human can give and clear of the net."""
         spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
-        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, spin, fastest=self.fastest(number))
+        aimed = aim(start, target, self.ball, seconds=seconds, bounces=self.passes[number].bounces, spin=spin,
+                    fastest=self.fastest(number))
         clear = self.clear(ways_of(start, aimed.velocity, spin, seconds, self.ball))
         return aimed, aimed.possible & (aimed.miss <= ON_TARGET) & clear
 

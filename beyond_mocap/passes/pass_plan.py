@@ -149,9 +149,9 @@ def plan_passes(
     court = Court(scene, list(sites), ball, cancelled or (lambda: False))
     chain = choose(court, lambda share, text: report(0.8 * share, text))
     places, normals = laid(court, chain)
-    orders = [_order(court, chain, number, 0.0, places, normals) for number in range(len(chain))]
+    orders = [_order(court, chain, number, time=0.0, places=places, normals=normals) for number in range(len(chain))]
     first = first_time(court, orders[0], need)
-    chain, hasty = in_time(court, chain, orders, places, first, need)
+    chain, hasty = in_time(court, chain, orders, places=places, first=first, need=need)
     report(0.9, "Flights")
     chain, flown = fitted(court, chain, places, first)
     strikes = _strikes(court, chain, flown, first)

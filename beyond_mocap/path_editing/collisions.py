@@ -43,7 +43,8 @@ def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE
     """
     found = []
     for first in range(len(places) - 1):
-        found += collisions_of(first, range(first + 1, len(places)), times, places, distance, height)
+        found += collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
+                               height=height)
     return sorted(found, key=lambda collision: (collision.start, collision.first, collision.second))
 
 
@@ -53,7 +54,7 @@ def collisions_of(one: int, others, times, places, distance: float = DISTANCE, h
     if len(times) < 2 or not len(others):
         return []
     rows, steps = np.indices((len(others), len(times) - 1)).reshape(2, -1)
-    return collisions_at(one, others[rows], steps, times, places, distance, height)
+    return collisions_at(one, others[rows], steps, times=times, places=places, distance=distance, height=height)
 
 
 def collisions_at(one: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
@@ -70,7 +71,8 @@ def collisions_at(one: int, others, steps, times, places, distance: float = DIST
     for other in np.unique(others[hit]):
         of = hit & (others == other)
         pair = [min(one, other), max(one, other)]
-        found += _joined(pair, steps[of], enter[of], leave[of], nearest[of], gap[of], times, places)
+        found += _joined(pair, steps[of], enter[of], leave=leave[of], nearest=nearest[of], gap=gap[of], times=times,
+                         places=places)
     return found
 
 

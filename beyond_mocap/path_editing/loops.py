@@ -75,7 +75,9 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     tried = _rough(features, residuals, free, least, stride)
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
     feet = _feet(residuals.skeleton, features)
-    found = [_exact(features, residuals, pair, free, least, stride, usual, feet) for pair in tried]
+    found = [_exact(
+        features, residuals, pair, free=free, least=least, stride=stride, usual=usual, feet=feet,
+    ) for pair in tried]
     found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):

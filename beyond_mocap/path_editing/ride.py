@@ -190,7 +190,9 @@ def prepare(
     place, turned = relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
     rotations = motion.rotations.copy()
     rotations[:, 0] = turned
-    under, up = _own_ground(motion, standing, path, arc, moving, metres) if humanoid else _flat(len(motion))
+    under, up = _own_ground(
+        motion, standing, path, arc=arc, moving=moving, metres=metres,
+    ) if humanoid else _flat(len(motion))
     residuals = Residuals(
         place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]), standing=np.asarray(standing, bool),
         frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
@@ -213,20 +215,21 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)
     rows = shown(residuals, timing.at)
-    at = _parameters(source, path, arc, timing, rows, settings)
+    at = _parameters(source, path, arc, timing=timing, rows=rows, settings=settings)
     origin, tangent = path.at(at), path.at(at, 1)
     own = _faces(source.motion, source.humanoid) if source.still and path is source.path else None
     moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
     root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
     laid = root, rotations
     if settings.lean and source.humanoid:
-        rotations = _leaned(source, rows, moving, timing, rotations, seams)
+        rotations = _leaned(source, rows, moving, timing=timing, rotations=rotations, seams=seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
-        free, strained = _strained(source, path, at, tangent, timing, rows)
-        under = _ground(path, arc, settings, ground, moving, timing, rows)
+        free, strained = _strained(source, path, at, tangent=tangent, timing=timing, rows=rows)
+        under = _ground(path, arc, settings, terrain=ground, moving=moving, timing=timing, rows=rows)
         steps, more = _steps(source, rows, moving, timing, free)
-        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, source.sole, steps)
+        held = follow(residuals.skeleton, root, rotations, standing=rows.standing, fps=residuals.fps, ground=under,
+                      sole=source.sole, steps=steps)
         if free.any():
             held = _let_go(held, root, rotations, free, residuals.fps)
             rows = rows.changed(standing=rows.standing & ~free[:, None, None])
@@ -261,7 +264,8 @@ def _timed(
         told += ("the motion stands still: it is placed at the path's beginning",)
     if way is not None:
         own = _own_way(source, residuals)
-        timing = by_way(residuals, own, way, wishes, settings.speed, settings.delay, path.closed)
+        timing = by_way(residuals, own, way, wishes=wishes, speed=settings.speed, delay=settings.delay,
+                        closed=path.closed)
     elif settings.by_arc_length or source.still:
         timing = by_arc_length(residuals, settings.speed, settings.delay)
     else:
@@ -311,9 +315,8 @@ def _leaned(
     since = np.diff(timing.arc, prepend=timing.arc[:1])
     own_slope = _own_slope(source, rows)
     own_speed = np.column_stack([rows.step * np.cos(own_slope) * fps, np.zeros(len(rows))])
-    lean = missing_lean(
-        since * np.cos(moving.slope) * fps, moving.heading, own_speed, rows.turn, seams, fps, LEANS_FROM
-    )
+    lean = missing_lean(since * np.cos(moving.slope) * fps, moving.heading, own_speed, turn=rows.turn, seams=seams,
+                        fps=fps, slow=LEANS_FROM)
     if np.abs(lean).max(initial=0.0) > 1e-9:
         rotations = banked(rows.skeleton, rotations, moving.heading, lean)
     steeper = zero_phase_hann((moving.slope - own_slope)[:, None], fps, SLOPE_SECONDS)[:, 0]

@@ -96,7 +96,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     goal = at_frames(turned, shown)
     over = track.towards(goal[1], np.arange(1, len(shown) + 1) / fps, _RATES[2])
     rotations = np.concatenate([poses[: touched + 1], down, over])
-    root = _root(motion, centre, rotations, touched + 1, len(down), turned, shown)
+    root = _root(motion, centre, rotations, flight=touched + 1, settling=len(down), up=turned, shown=shown)
     rotations = arms_above_ground(skeleton, root, rotations, fps)
     root[:, 2] += widened(np.maximum(lowest_root(skeleton, rotations) - root[:, 2], 0.0), fps)
     out = Motion(

@@ -70,7 +70,8 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     hips[:, 2] = rise
     for side in (LEFT, RIGHT):
         ankles[:, side], feet[:, side, 1], toes[:, side] = _jumping_foot(
-            ankles[:, side], feet[:, side, 2], times, air, rise, pitch, tuck * scale, neutral
+            ankles[:, side], feet[:, side, 2], times, air=air, rise=rise, pitch=pitch, tuck=tuck * scale,
+            neutral=neutral,
         )
     pelvis = posture.pelvis + np.stack([0 * times, trunk[:, 0], 0 * times], -1) * ease[:, None]
     spine = posture.spine + np.stack([0 * times, trunk[:, 1], 0 * times], -1) * ease[:, None]

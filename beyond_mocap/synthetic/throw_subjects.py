@@ -58,7 +58,7 @@ def subject_throws(
     manner = scattered(thrower.manner, _SCATTER, chance)
     effort = float(np.clip((speed - _LEAST) / (thrower.fastest - _LEAST), 0.0, 1.0))
     style = styled(STYLES["overarm"], manner, effort)
-    return throw(target, speed, thrower.side, style, thrower.skeleton, fps)
+    return throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
 
 
 def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:

@@ -128,7 +128,7 @@ class _Aim:
                 "kick", f"a ball of {speed:g} m/s passes the target by {np.linalg.norm(met - target):.2f} m",
                 "a target that it can reach", "kick faster, or aim lower or nearer",
             )
-        motion = kicked(self.style, self.neutral, self.foot, way[0], way[1], rate, turn, fps)
+        motion = kicked(self.style, self.neutral, self.foot, lift=way[0], loft=way[1], rate=rate, turn=turn, fps=fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
         return Kick(motion=place(motion, 0.0, back), contact=BEFORE / rate, foot=self.foot, ball=start,
                     velocity=spun[0], spin=spun[1])

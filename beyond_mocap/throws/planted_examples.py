@@ -68,7 +68,7 @@ def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) ->
         inside = speed < _INSIDE[0] and target[2] < _INSIDE[1] and chance.uniform() < _INSIDE[2]
         style = kick_style(who, KICKS["inside" if inside else "instep"], speed, chance)
         try:
-            made = kick(tuple(target), speed, who.side, style, who.skeleton, fps)
+            made = kick(tuple(target), speed, who.side, style=style, skeleton=who.skeleton, fps=fps)
         except InputError:
             continue  # too far for this speed, or lower or higher than this foot sends it
         words = f"kick {made.foot} low {'inside' if inside else 'top'} running"

@@ -457,8 +457,8 @@ class _Work:
             motion = Retargeter(motion, self.skeleton).carry(motion)
         part = part_of(self.skeleton, self.limb, self.ball)
         limits = LimbLimits.of(
-            stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), motion,
-            part.chain(motion), self.mirrored,
+            stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), shown=motion,
+            joints=part.chain(motion), mirrored=self.mirrored,
         )
         frame = release * motion.fps
         hips = motion.root_positions[0, :2]
@@ -492,8 +492,8 @@ class _Work:
     def corrected(self, made: _Made) -> Corrected:
         """The motion with which the ball hits, or as near as that comes."""
         order, frame = self.order, made.release * made.motion.fps
-        return corrected(made.motion, self._part(), frame, self.target, self.ball, order.freedom, order.speed,
-                         made.limits.held)  # fmt: skip
+        return corrected(made.motion, self._part(), frame, target=self.target, ball=self.ball, freedom=order.freedom,
+                         speed=order.speed, hold=made.limits.held)  # fmt: skip
 
     def thrown(self, made: _Made, found: Corrected) -> Thrown:
         """What came of it."""

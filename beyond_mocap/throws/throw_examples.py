@@ -123,7 +123,8 @@ def examples_in(
             without.append(name)
             continue
         try:
-            found += _of_clip(path, name, ACTIONS[action], words, table.get(name), fps, bring, told)
+            found += _of_clip(path, name, ACTIONS[action], words=words, rows=table.get(name), fps=fps, bring=bring,
+                              told=told)
         except InputError as error:
             told(f"{name}: left out, {error}")
     if len(without) == len(clips):
@@ -185,7 +186,8 @@ def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: flo
     for order, known in enumerate(every):
         own = name if len(every) == 1 else f"{name} {order + 1}"
         try:
-            out.append(_example(own, motion, known, action, fps, bring, _subject(name, known, motion)))
+            out.append(_example(own, motion, known, action=action, fps=fps, bring=bring,
+                                who=_subject(name, known, motion)))
         except BeyondMocapError as error:
             told(f"{own}: left out, {error}")
     return out
@@ -333,7 +335,8 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
     if there is not cut:  # the same launch from another hand's place
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
     begin, end = _stretch(motion, known, action)
-    return example_of(name, who, there, limb, release, impact, launch, fps, (begin - first, end - first))
+    return example_of(name, who, there, limb=limb, release=release, impact=impact, launch=launch, fps=fps,
+                      span=(begin - first, end - first))
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:

@@ -179,14 +179,15 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
     ground = wish.way == "GROUND"
     turns = (wish.back, wish.left)
-    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, what=f"ball {name}")
+    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=turns, ground=ground,
+                 fastest=fastest, what=f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
     times = np.linspace(0.0, shot.seconds, STROKES)
     ways, _ = courses(shot.starts[can], shot.aimed.velocity[can], shot.aimed.spin[can], kind, times)
-    return Solved(made_of, shot, strikes, flight, int(strikes.frames[shot.chosen]), fps,
-                  tuple(target), ways)
+    return Solved(made_of, shot, strikes, flight=flight, strike=int(strikes.frames[shot.chosen]), fps=fps,
+                  target=tuple(target), candidates=ways)
 
 
 def digest(wish: Wish, strikes: "Strikes") -> str:

@@ -55,7 +55,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
     if player.feed_id:
         end = settings.section_end if settings.section_end > settings.section_start else None
         path, metadata = absolute(player.tracking_file), absolute(player.metadata_file)
-        return Order((), path, metadata, player.provider, settings.section_start, end)
+        return Order((), path, metadata, provider=player.provider, start=settings.section_start, end=end)
     others = [one for one in settings.players if one.use and one != player and one.tracking_file and not one.feed_id]
     return Order(tuple((one.name, tracks.read_track(settings, one)) for one in (player, *others)))
 

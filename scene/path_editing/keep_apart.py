@@ -136,7 +136,8 @@ def _trial(scene, body) -> Trial:
     settings = RideSettings(**{**wishes(ride), "detours": (), "delay": round(_own_delay(ride), 6)})
     known = source.of(carrier, scene, settings)
     ground = source.ground_of(scene, ride.ground, source.ground_digest(scene, ride.ground))
-    return Trial(body.name, known.read.first, known.core, curve.read(scene, ride.curve).path(), settings, ground)
+    return Trial(body.name, known.read.first, known.core, path=curve.read(scene, ride.curve).path(), settings=settings,
+                 ground=ground)
 
 
 def _own_delay(ride) -> float:

@@ -114,7 +114,7 @@ def solve(
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, stranger))
-    solved = _named(samples, found, positions, players, teams, pitch, stranger)
+    solved = _named(samples, found, positions, players=players, teams=teams, pitch=pitch, stranger=stranger)
     curves = [piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)]
     if progress is not None:
         progress(0.6, "flights")

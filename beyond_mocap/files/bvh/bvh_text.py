@@ -231,12 +231,13 @@ def _number(word: str) -> float | None:
 
 def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
     """Frames, seconds per frame, where the rows start (byte, line) from the two lines after MOTION."""
-    frames_text, start, line = _labelled(path, data, start, line, rb"Frames\s*:", "Frames: and how many")
+    frames_text, start, line = _labelled(path, data, start, line=line, label=rb"Frames\s*:",
+                                         expected="Frames: and how many")
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
     expected = "Frame Time: and seconds per frame"
-    time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
+    time_text, start, line = _labelled(path, data, start, line=line, label=rb"Frame\s*Time\s*:", expected=expected)
     frame_time = _number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
         raise InputError(

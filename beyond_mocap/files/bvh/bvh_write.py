@@ -47,7 +47,7 @@ def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, .
         place = root if i == 0 else motion.skeleton.offsets[i][None]
         ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
         turn = rotation if i == 0 else motion.rotations[:, i]
-        joints.append(_joint(name, len(form.above) + depth, declared, place, turn, ends))
+        joints.append(_joint(name, len(form.above) + depth, declared, place=place, turn=turn, ends=ends))
     notes = tuple(f"{j.name}: {', '.join(j.added)} added, the motion needs it" for j in joints if j.added)
     return _text(joints, motion.fps), notes
 
@@ -142,7 +142,7 @@ def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
     for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
         place, turn = _relative(world, parent)
         place = place if joint.moves else joint.position[None]
-        out.append(_joint(joint.name, depth, joint.channels, place, turn, np.zeros((0, 3))))
+        out.append(_joint(joint.name, depth, joint.channels, place=place, turn=turn, ends=np.zeros((0, 3))))
     return out
 
 

@@ -80,7 +80,7 @@ def signals(motion: Motion) -> Signals:
     strikes = _strikes(places, moving, body, head, facing)
     return Signals(fps=motion.fps, count=len(motion), frames=at, middle=points([body.chest, head]),
                    paired=np.stack([points(one) for one in sides], axis=1),
-                   trunk=_trunk(motion, body, places, moving, facing, leg)[rows], strikes=strikes)
+                   trunk=_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows], strikes=strikes)
 
 
 def _points_of(body: Humanoid, limb) -> list[int]:

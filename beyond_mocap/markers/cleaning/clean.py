@@ -88,7 +88,7 @@ class _Work:
     def look_again(self, changed: Sequence[int]):
         """See it anew where a few samples of these markers have changed."""
         named = [i for i in self.carried if self.seen(i)]
-        self.carried = carriers(self.positions, self.soft, named, self.carried, changed, self.ask)
+        self.carried = carriers(self.positions, self.soft, named, known=self.carried, changed=changed, ask=self.ask)
 
     def seen(self, marker):
         return np.isfinite(self.positions[:, marker, 0]).any()
@@ -147,7 +147,8 @@ def _swaps(work):
     work.positions, found = there_and_back(work.positions, work.carried)
     _note_swaps(work, found)
     leaping = leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = mend(work.positions, work.carried, leaping, work.trial.fps, _opposite(work), work.ask)
+    work.positions, found = mend(work.positions, work.carried, leaping, fps=work.trial.fps, opposite=_opposite(work),
+                                 ask=work.ask)
     _note_swaps(work, found)
 
 
@@ -193,7 +194,7 @@ def _names(work):
 def _gaps(work, settings):
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
-    filled, found = fill(work.positions, work.soft, work.trial.fps, longest, work.carried, work.ask)
+    filled, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried, ask=work.ask)
     work.positions = filled
     for name, kept in (("gaps", True), ("left", False)):
         work.found[name] = tuple(

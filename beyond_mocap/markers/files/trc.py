@@ -95,7 +95,8 @@ def _head(path: Path, lines: list[str]) -> _Head:
     named = _cells(lines[at], tabs)
     labels, starts = _labels(path, named, at, tabs)
     if below is not None:
-        labels, starts, order = _by_coordinates(path, _cells(lines[below], tabs), below, labels, starts, tabs)
+        labels, starts, order = _by_coordinates(path, _cells(lines[below], tabs), below, labels=labels, starts=starts,
+                                                tabs=tabs)
     else:
         order = (0, 1, 2)
     if not labels:

@@ -253,7 +253,8 @@ def refined(
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
     body = _body(model)
-    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen_markers(model, part), _sigmas(model), worth)
+    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen=seen_markers(model, part),
+                      sigma=_sigmas(model), worth=worth)
     task.start(motion)
     for _ in range(2):
         if cancelled():

@@ -146,7 +146,8 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
     """
     began = time.perf_counter()
     seen = _positions(model, trial)
-    solving = _Solving(_chain(model, settings.limits), seen, settings, trial.fps, _usual(model), progress, cancelled)
+    solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=_usual(model),
+                       progress=progress, cancelled=cancelled)
     solving.run()
     return solving.result(time.perf_counter() - began)
 
@@ -154,8 +155,8 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
 def _chain(model, limited: bool) -> Chain:
     """The chain of a model."""
     freedom = model.freedom
-    made = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free, freedom.low, freedom.high,
-                 model.stiffness)
+    made = chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
+                 high=freedom.high, stiffness=model.stiffness)
     return made if limited else made.without_limits()
 
 

@@ -146,11 +146,12 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     notes += even.notes[len(trial.notes) :]
     found = None
     if marker is not None:
-        found = _by_ball(hand, marker, lies, ball, settings, notes)
-        found = _believed(found, hand, marker, label, lies.radius, settings, even.name, notes)
+        found = _by_ball(hand, marker, lies, ball=ball, settings=settings, notes=notes)
+        found = _believed(found, hand, marker, label=label, radius=lies.radius, settings=settings, name=even.name,
+                          notes=notes)
     found = found or _by_hand(hand, motion, lies, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
-    return _result(found, hand, motion, lies, seen, even.name, notes)
+    return _result(found, hand, motion, lies=lies, seen=seen, name=even.name, notes=notes)
 
 
 def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
@@ -339,7 +340,9 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
-    fits = [(fit_launch(marker, course, hand.fps, guess, air, lies.radius, settings.window), air)
+    fits = [(fit_launch(
+        marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius, window=settings.window,
+    ), air)
             for air in (ball, _without_air(ball))]
     if fits[0][0] is None or fits[1][0] is None:
         return None

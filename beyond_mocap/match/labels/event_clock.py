@@ -158,7 +158,7 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     early, late, certain = np.array(early), np.array(late), np.array(origin)
     lag = _commonest(early - late, np.where(certain, 1.0, _DOUBTFUL))
     lag, drift = _line(early, late, lag)
-    fit = _Fit(events, since, when, who, (span[0] - start, span[1] - start), drift)
+    fit = _Fit(events, since, when, who=who, span=(span[0] - start, span[1] - start), drift=drift)
     right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
     if right[0, 1] < _INSIDE:
         return None

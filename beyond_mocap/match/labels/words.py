@@ -101,12 +101,15 @@ def words_of(
     for player, path in zip(match.players, match.positions):
         own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
         found = [
-            moment_of(touch, match.times, path, heights, table, onto.events[told[i]] if i in told else None)
+            moment_of(touch, match.times, path, heights=heights, table=table,
+                      event=onto.events[told[i]] if i in told else None)
             for i, touch in own
         ]
         found = [moment for moment in found if moment]
         sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
-        sure += _untouched(player.id, onto, span, match.times, path, table, found) if onto else []
+        sure += _untouched(
+            player.id, onto, span, times=match.times, path=path, table=table, beside=found,
+        ) if onto else []
         kept = apart(sure)
         left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
         left_out["close"] += len(sure) - len(kept)

@@ -20,7 +20,9 @@ back."""
 
 def key_results(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown) -> tuple[KeyResult, ...]:
     """How every key moment of an order came out in `played`, whose frames are at `fps`."""
-    return tuple(_key_result(library, fps, order, edit, played, number) for number in range(len(order.keys)))
+    return tuple(_key_result(
+        library, fps, order, edit=edit, played=played, number=number,
+    ) for number in range(len(order.keys)))
 
 
 def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:

@@ -119,7 +119,9 @@ def steps(
     places, world = pose_kinematics(skeleton, root, rotations)
     heading = np.unwrap(quaternion.yaw(rotations[:, 0]))
     limbs = (body.left, body.right)
-    feet = [_Foot(limb, places, world, root, heading, standing[:, side]) for side, limb in enumerate(limbs)]
+    feet = [_Foot(
+        limb, places, world, root=root, heading=heading, standing=standing[:, side],
+    ) for side, limb in enumerate(limbs)]
     upright = root[:, 2] > UPRIGHT * np.median(root[:, 2])
     speed = np.linalg.norm(np.gradient(zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
     stepped = none.stepped if given is None else given

@@ -86,7 +86,9 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     timeline = fill(plan.timeline, track.times, automatic)
     allowed = np.array([asked_for.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
-    keys = tuple(_key(library, moment, track, gait, allowed, asked_for.nearest, warnings) for moment in timeline.keys)
+    keys = tuple(_key(
+        library, moment, track, gait=gait, allowed=allowed, go_on=asked_for.nearest, warnings=warnings,
+    ) for moment in timeline.keys)
     known = plan.track.ball_height_known
     nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.in_force))) for key in keys]
     keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))

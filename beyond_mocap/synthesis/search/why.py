@@ -116,7 +116,7 @@ def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, 
         near = (
             tuple(_others(search, way, mine[0], sum(unary[0].values()) + sum(seam.values()), others)) if others else ()
         )
-        found.append(_reason(library, edit, first, end, costs, _summed([seam]), near))
+        found.append(_reason(library, edit, first, end=end, costs=costs, seam=_summed([seam]), others=near))
     return found
 
 
@@ -139,7 +139,7 @@ def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float
             seam["pose"] = float(
                 weight * distances(after, windows(frames, edit.clip[[first]], place[[first]], size))[0, 0]
             )
-        found.append(_reason(library, edit, first, end, {"words": alpha * float(np.sum(blocks))}, seam))
+        found.append(_reason(library, edit, first, end=end, costs={"words": alpha * float(np.sum(blocks))}, seam=seam))
     return found
 
 
@@ -233,7 +233,8 @@ def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.
     recent = np.full(MEMORY_SLOTS, -1)
     recent[MEMORY_SLOTS - len(starts) :] = search.offer.bucket[search.costs.inside(starts)]
     one, nothing = slice(slot - 1, slot), np.zeros(1, int)
-    state = States(way.clip[one], way.start[one], way.rate[one], np.zeros(1), nothing, way.piece[one], recent[None])
+    state = States(way.clip[one], way.start[one], way.rate[one], cost=np.zeros(1), back=nothing, piece=way.piece[one],
+                   recent=recent[None])
     return state, state.start + state.rate * (way.edges[slot] - way.edges[slot - 1])
 
 

@@ -44,8 +44,8 @@ def sampled(
     ball = match.ball_at(times) - np.array([0.0, 0.0, match.ball.radius])
     players = match.players_at(times)
     measured = ball + _slow_noise(rng, ball.shape, _SLOW * fps, 0.87 * noise) + rng.normal(0.0, 0.5 * noise, ball.shape)
-    wrong = _snapped(match, times, measured, players, snaps, rng)
-    made = _filled(match, times, measured, ball, filled, rng)
+    wrong = _snapped(match, times, measured, players=players, share=snaps, rng=rng)
+    made = _filled(match, times, measured, ball=ball, share=filled, rng=rng)
     measured[:, 2] = np.maximum(measured[:, 2], 0.0) if heights else np.nan
     seen = players + _slow_noise(rng, players.shape, _PLAYERS_SLOW * fps, _PLAYERS_NOISE, axis=1)
     seen += rng.normal(0.0, _JITTER, seen.shape)
