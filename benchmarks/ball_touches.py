@@ -50,19 +50,17 @@ def thinned(match: Match, every: int = 1, heights: bool = True) -> Match:
     ball = match.ball[part].copy()
     if not heights:
         ball[:, 2] = np.nan
-    return Match(
-        match.times[part], match.players, match.positions[:, part], ball, match.length, match.width,
-        match.fps / every, match.provider, match.periods, match.notes,
-    )  # fmt: skip
+    return Match(times=match.times[part], players=match.players, positions=match.positions[:, part], ball=ball,
+                 length=match.length, width=match.width, fps=match.fps / every, provider=match.provider,
+                 periods=match.periods, notes=match.notes)  # fmt: skip
 
 
 def of_feed(feed: Feed) -> Match:
     """A made feed as a match that was read."""
     players = tuple(MatchPlayer(name, team, name, i) for i, (name, team) in enumerate(zip(feed.ids, feed.teams)))
     end = float(feed.times[-1])
-    return Match(
-        feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "made", ((0.0, end),)
-    )
+    return Match(times=feed.times, players=players, positions=feed.positions, ball=feed.ball, length=feed.length,
+                 width=feed.width, fps=feed.fps, provider="made", periods=((0.0, end),))
 
 
 def by_hand(name: str, match: Match, path: Path = BY_HAND, solved: SolvedBall | None = None) -> Measured:

@@ -117,7 +117,7 @@ def _number(value: float, form: str) -> str:
 
 def networks_row(kind: str, points: int, layers: int, units: int) -> str:
     """The networks of one size, evaluated frame after frame on a full body."""
-    settings = ModelSettings(kind, points, layers, units)
+    settings = ModelSettings(kind=kind, points=points, layers=layers, units=units)
     random = np.random.default_rng(1)
     made = [_network(random, *size, settings) for size in widths(chains_of(adult_skeleton(1.8)), settings).values()]
     inputs = [random.normal(size=network.inputs).astype(np.float32) for network in made]

@@ -211,9 +211,8 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
     def do(self, context):
         """Analyse, note, mark."""
         body = subject(context)
-        found = hits_shown.analyse(
-            context.scene, body, self.part, self.side, self.threshold, self.bone, self.markers
-        )
+        found = hits_shown.analyse(context.scene, body, self.part, side=self.side, threshold=self.threshold,
+                                   bone=self.bone, markers=self.markers)
         count = len(found.motions)
         what = self.bone or self.part
         if not count:
@@ -287,7 +286,8 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
         body, ball, scene = subject(context), ball_of(context), context.scene
         bone = self.bone or possession.bone_of(scene, body, self.part, self.side)
         skin = 0.03 if self.bone else possession.SURFACE.get(self.part, 0.03)
-        possession.take(scene, ball, body, bone, self.first, self.last, self.how, self.settle, skin)
+        possession.take(scene, ball, body, bone=bone, first=self.first, last=self.last, how=self.how,
+                        settle=self.settle, skin=skin)
         self.report({"INFO"}, f"{body.name} carries {ball.name} with {bone} on frames {self.first} to {self.last}")
 
 

@@ -47,7 +47,8 @@ ENTRIES: tuple[Entry, ...] = (
         for number, key in enumerate(("ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"), 1)
     ),
     *(
-        Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key, ("alt",), {"direction": direction}, repeat=True)
+        Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key=key, modifiers=("alt",),
+              properties={"direction": direction}, repeat=True)
         for key, direction in NUDGES.items()
     ),
 )

@@ -309,7 +309,8 @@ of it. What is written there already is overwritten only when you say so"""
         rig = context.object
         rows = clip_annotation.said(rig)
         clip, folder = clip_annotation.clip_file(rig)
-        target = keep(clip, folder, rows, rig[clip_annotation.RATE], self.overwrite, proposals.sources(rig))
+        target = keep(clip, folder, rows, fps=rig[clip_annotation.RATE], overwrite=self.overwrite,
+                      sources=proposals.sources(rig))
         clips.say(context.window_manager, clip_annotation.shown(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of words written to {target}; Build Library takes them in")
 
@@ -355,7 +356,8 @@ same acts in others. What is learned is kept in a file, which serves any library
         out = Path(order.out) if order.out else cache.place(Path(order.folder), order.cache)[0] / keep.NAME
         looked = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
-        examples = examples_of(order.folder, order.unit, looked, order.cache, cancelled, notes.append)
+        examples = examples_of(order.folder, order.unit, looked, cache_dir=order.cache, cancelled=cancelled,
+                               note=notes.append)
         known = trained(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
         if not order.out:
             out.parent.mkdir(parents=True, exist_ok=True)

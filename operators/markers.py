@@ -341,7 +341,8 @@ clip of the library where asked for"""
         """Reconstruct it."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
-        made = reconstruct(order.trial, order.static, order.model, order.settings, progress, cancelled)
+        made = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
+                           cancelled=cancelled)
         return order, made
 
     def apply(self, scene, result):

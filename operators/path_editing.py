@@ -70,7 +70,8 @@ back"""
                 riders.change(context.scene, body, drawn)
             for body in [body for body in chosen if not body.beyond_mocap_ride.on]:
                 before = body.beyond_mocap_ride.curve
-                made = riders.begin(context, body, drawn, self.count, self.kind, self.degree, self.straight)
+                made = riders.begin(context, body, drawn, count=self.count, kind=self.kind, degree=self.degree,
+                                    straight=self.straight)
                 begun.append((body, before, made if made not in (drawn, before) else None))
                 used = used or made
         except BeyondMocapError:
@@ -119,7 +120,7 @@ curve before is removed if it was made here and nobody else rides it"""
     def do(self, context):
         """The curve, which becomes active."""
         body = meant(context)[0]
-        made = riders.new_curve(context, body, self.shape, self.count, self.kind, self.degree)
+        made = riders.new_curve(context, body, self.shape, count=self.count, kind=self.kind, degree=self.degree)
         if context.mode == "POSE":
             bpy.ops.object.mode_set(mode="OBJECT")
         choose(context, made)

@@ -324,9 +324,8 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
         """Write it."""
         path = self.out()
         rigs = self.rigs(context)
-        wanted = export.Wanted(
-            path, self.format, self.engine, self.rate(context), self.root, self.deform_only, self.meshes
-        )
+        wanted = export.Wanted(path, self.format, self.engine, rate=self.rate(context), root=self.root,
+                               deform_only=self.deform_only, meshes=self.meshes)
         for line in export.write(context, rigs, wanted):
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"Written: {path}")

@@ -176,7 +176,7 @@ with G; time and hold stand in the list of pins"""
             place = pins.body_place(context, player, self.part)
         else:
             place = np.array(scene.cursor.location) / units_per_metre(scene)
-        pins.add(context, player, self.part, seconds, self.hold, place, bake.collection(scene))
+        pins.add(context, player, self.part, seconds=seconds, hold=self.hold, place=place, room=bake.collection(scene))
         self.report({"INFO"}, f"{player.name}: {part} pinned at {seconds:.2f} s; move it with G, then Update")
 
 

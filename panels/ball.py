@@ -53,7 +53,9 @@ def tracked(panel, layout, context) -> None:
         table(layout, settings.solved.splitlines())
     if not len(settings.touches):
         return
-    layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, "active_touch", rows=5)
+    layout.template_list(
+        "BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch", rows=5
+    )
     if touch := active_row(settings.touches, settings.active_touch):
         layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
         row = layout.row(align=True)

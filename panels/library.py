@@ -95,7 +95,7 @@ def draw_clips(layout, settings, listing, current) -> None:
     row.prop(listing, "find", text="", icon="VIEWZOOM")
     row.prop(listing, "order", text="", icon="SORTALPHA", icon_only=True)
     row.operator("beyond_mocap.list_clips", text="", icon="FILE_REFRESH")
-    layout.template_list("BEYOND_MOCAP_UL_clips", "", listing, "shown", listing, "active", rows=6)
+    layout.template_list("BEYOND_MOCAP_UL_clips", "", listing, "shown", listing, active_propname="active", rows=6)
     if not 0 <= listing.active < len(listing.shown):
         layout.label(text="No clip fits", icon="INFO")
         return
@@ -144,7 +144,7 @@ def draw_opened(layout, thing, settings) -> None:
 
 def draw_proposals(layout, group) -> None:
     """What was proposed, and the keys to judge it."""
-    layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, "active", rows=4)
+    layout.template_list("BEYOND_MOCAP_UL_proposals", "", group, "listed", group, active_propname="active", rows=4)
     if 0 <= group.active < len(group.listed):
         one = group.listed[group.active]
         paragraph(layout, one.name.replace("_", " "), "BOOKMARKS")

@@ -62,7 +62,7 @@ def labels(layout, kept) -> None:
     row.operator_menu_enum("beyond_mocap.use_marker_set", "which", text=kept.set_name or "Marker Set", icon="PRESET")
     row.operator("beyond_mocap.load_marker_set", text="", icon="FILE_FOLDER")
     row.operator("beyond_mocap.save_marker_set", text="", icon="FILE_TICK")
-    layout.template_list("BEYOND_MOCAP_UL_markers", "", kept, "labels", kept, "active_label", rows=5)
+    layout.template_list("BEYOND_MOCAP_UL_markers", "", kept, "labels", kept, active_propname="active_label", rows=5)
     layout.operator_menu_enum("beyond_mocap.assign_markers", "segment", text="Assign to Segment", icon="BONE_DATA")
     label = active_label(kept.id_data)
     if label is not None:

@@ -71,7 +71,7 @@ def more_files(layout, match) -> None:
 
 def people(layout, match) -> None:
     """The list, ticks for many at once, and the teams' colours."""
-    layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, "active", rows=5)
+    layout.template_list("BEYOND_MOCAP_UL_match", "", match, "players", match, active_propname="active", rows=5)
     row = layout.row(align=True)
     for whom, text in (("ALL", "All"), ("NONE", "None"), ("home", "Home"), ("away", "Away"), ("ONE", "Chosen")):
         row.operator("beyond_mocap.tick_match", text=text).whom = whom

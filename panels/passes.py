@@ -47,7 +47,7 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
 def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
     """A list with what adds to it, takes away and moves."""
     row = layout.row()
-    row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active, rows=3)
+    row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active_propname=active, rows=3)
     column = row.column(align=True)
     for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
         button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
@@ -61,10 +61,10 @@ def passing(panel, layout, context) -> None:
     row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
     row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
     row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
-    lists(layout, "passers", settings, "players", "active_player", "passes_list")
+    lists(layout, "passers", settings, rows="players", active="active_player", verb="passes_list")
     if player := active_row(settings.players, settings.active_player):
         of_player(layout, player)
-    lists(layout, "passes", settings, "passes", "active_pass", "passes_list")
+    lists(layout, "passes", settings, rows="passes", active="active_pass", verb="passes_list")
     if one := active_row(settings.passes, settings.active_pass):
         of_pass(layout, settings, one)
     row = layout.row(align=True)

@@ -36,7 +36,9 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
         row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
         row = layout.row()
-        row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, "active_player", rows=3)
+        row.template_list(
+            "BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player", rows=3
+        )
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
         if any(player.dot is None for player in settings.players):
             layout.operator("beyond_mocap.place_players", icon="NLA")
@@ -103,7 +105,7 @@ def pinned(layout, player) -> None:
     header.label(text=f"Pins: {len(player.pins)}" if player.pins else "Pins")
     if body:
         row = body.row()
-        row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, "active_pin", rows=2)
+        row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")
         row = body.row(align=True)
         row.operator_menu_enum("beyond_mocap.add_pin", "part", text="Add Pin at Body", icon="PINNED").at = "BODY"

@@ -26,7 +26,7 @@ def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         column.label(text=keymap.name)
         for item in own.keymap_items:
             if item.idname.startswith("beyond_mocap."):
-                rna_keymap_ui.draw_kmi(["ADDON", "USER", "DEFAULT"], configurations.user, own, item, column, 0)
+                rna_keymap_ui.draw_kmi(["ADDON", "USER", "DEFAULT"], configurations.user, own, item, column, level=0)
 
 
 def _with_our_keys(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:

@@ -60,7 +60,7 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
         header, body = layout.panel("beyond_mocap_bone_map", default_closed=True)
         header.label(text="Bone Map")
         if body:
-            body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, "active_bone", rows=8)
+            body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
             row = body.row(align=True)
             row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
             row.operator("beyond_mocap.keep_bone_map", text="Keep", icon="PINNED")

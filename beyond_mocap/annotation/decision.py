@@ -60,7 +60,7 @@ class Held:
         return self.moments if kind == "moment" else self.spans
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Option:
     """A word on a number key. page from 0, digit 1 to 9. served: whether the library has it together with the words
     chosen before. instead: the nearest combination that it has, where it has not; empty where nothing comes near.
@@ -124,7 +124,8 @@ def _option(word: str, place: int, walk: Walk, held: Held | None) -> Option:
     chosen = word in walk.words
     words = choose(walk, word).words if not chosen else walk.words
     has = held is None or word == TRANSITION or _has(held, walk.kind, words)
-    return Option(word, page, digit + 1, has, () if has else instead_of(words, walk.kind, held), chosen)
+    return Option(word=word, page=page, digit=digit + 1, served=has,
+                  instead=() if has else instead_of(words, walk.kind, held), chosen=chosen)
 
 
 def _has(held: Held, kind: str, words: tuple[str, ...]) -> bool:

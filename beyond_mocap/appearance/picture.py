@@ -40,7 +40,7 @@ def pose_picture(motion: Motion, frame: int, size: int = 256) -> np.ndarray:
     flat = (flat - flat.min(axis=0) - 0.5 * np.ptp(flat, axis=0)) * (wide * (1.0 - 2.0 * _MARGIN) / span) + 0.5 * wide
     quads = np.array([face if len(face) == 4 else (*face, face[-1]) for face in body.faces])
     canvas = np.zeros((wide, wide, 4))
-    _draw_faces(canvas, skin, flat, quads, np.asarray(body.material), away)
+    _draw_faces(canvas, skin, flat, quads=quads, material=np.asarray(body.material), away=away)
     return _averaged(canvas, size)
 
 

@@ -44,7 +44,7 @@ NUDGE = 1e-3
 """m/s by which a launch is varied to see where that takes it."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Aimed:
     """How balls (B) have to leave: velocity (B, 3) m/s, spin (B, 3) rad/s as given, seconds (B,) until each is there,
     miss (B,) m that it passes its target by then, possible (B,) bool: hit, within the speeds allowed. Where not,
@@ -71,7 +71,7 @@ def aim(
     start, target, spin may be (3,): the same for all. Starts and targets lower than a ball can lie are set onto the
     ground. InputError: numbers that cannot be meant.
     """
-    problem = _Problem.of(start, target, ball, seconds, bounces, spin, ground)
+    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft, about))
     velocity, miss = _solved(problem, near)
@@ -87,7 +87,7 @@ def aim(
     possible = miss <= CLOSE
     if fastest is not None:
         possible &= length(velocity) <= fastest
-    return Aimed(velocity, problem.spin, problem.seconds, miss, possible)
+    return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
 def along_ground(
@@ -99,7 +99,7 @@ def along_ground(
     seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
     InputError as `aim`.
     """
-    problem = _Problem.of(start, target, ball, seconds, 0, None, ground)
+    problem = _Problem.of(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
     low = ground + ball.radius
     problem.start[:, 2], problem.target[:, 2] = low, low
     way = problem.target - problem.start
@@ -113,7 +113,7 @@ def along_ground(
     possible = miss <= CLOSE
     if fastest is not None:
         possible &= speed <= fastest
-    return Aimed(velocity, problem.spin, problem.seconds, miss, possible)
+    return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
 def out_of_reach(
@@ -153,7 +153,7 @@ def _solved(problem: _Problem, near: np.ndarray | None) -> tuple[np.ndarray, np.
     return velocity, miss
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Problem:
     """Aims (B): start, target, spin (B, 3), seconds (B,), and what they have in common."""
 
@@ -180,7 +180,8 @@ class _Problem:
             raise InputError("aim", f"{np.min(timed):g} s of flight", "a time of more than 0 s")
         for place in (start, target):
             place[:, 2] = np.maximum(place[:, 2], ground + ball.radius)
-        return cls(start, target, spin, np.broadcast_to(timed, shape[:1]).copy(), ball, int(bounces), ground)
+        return cls(start=start, target=target, spin=spin, seconds=np.broadcast_to(timed, shape[:1]).copy(), ball=ball,
+                   bounces=int(bounces), ground=ground)
 
     def at_time(self, seconds: np.ndarray) -> _Problem:
         return replace(self, seconds=seconds)

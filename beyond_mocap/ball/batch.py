@@ -70,7 +70,8 @@ def after(
         for phase, step in ((AIR, _air), (SLIDE, _slide), (ROLL, _roll)):
             which = going[balls.phase[going] == phase]
             if len(which):
-                left[which] -= step(balls, which, np.minimum(left[which], longest), ball, ground + ball.radius, most)
+                steps = np.minimum(left[which], longest)
+                left[which] -= step(balls, which, steps, ball, low=ground + ball.radius, most=most)
     return balls
 
 
@@ -115,7 +116,7 @@ def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: fl
         steps = steps.copy()
         before = _rows(start[0], landing), _rows(start[1], landing), _rows(start[2], landing)
         under = (place[landing], velocity[landing])
-        steps[landing] = _until_ground(move, before, under, steps[landing], ball, low)
+        steps[landing] = _until_ground(move, before, under, steps=steps[landing], ball=ball, low=low)
         place[landing], velocity[landing], spin[landing] = move(*before, steps[landing], ball)
         place[landing, 2] = low
     balls.position[which], balls.velocity[which], balls.spin[which] = place, velocity, spin

@@ -44,7 +44,7 @@ class Piece:
     state: Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Flight:
     """The way of a ball. Before its launch it lies at the start, after `end` it stays where it is then.
 
@@ -132,8 +132,8 @@ class _Integrator:
             self._roll()
         if self._left() or not self.pieces:
             self._rest()
-        return Flight(self.launch, self.ball, tuple(self.pieces), np.array(self.bounces), self.rolls_from,
-                      self.rests_from, self.end)
+        return Flight(launch=self.launch, ball=self.ball, pieces=tuple(self.pieces), bounces=np.array(self.bounces),
+                      rolls_from=self.rolls_from, rests_from=self.rests_from, end=self.end)
 
     def _left(self) -> bool:
         return self.time < self.end

@@ -21,7 +21,7 @@ RISE = 0.3
 """How much the first guess of a launch leads up, for one that leads level."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Strikes:
     """Where a part can strike, at frames (N,) of a scene, in the world: start, end (N, 3) m of its line, radius m,
     velocity (N, 3) m/s."""
@@ -42,7 +42,8 @@ class Strikes:
             lines.append(np.array(surface.line(*pose_kinematics(motion.skeleton, root, local))))
         taken = np.clip(rows + step, 0, len(motion) - 1) - np.clip(rows - step, 0, len(motion) - 1)
         velocity = (lines[2] - lines[0]).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
-        return cls(np.asarray(frames), lines[1][0], lines[1][1], surface.radius, velocity)
+        return cls(frames=np.asarray(frames), start=lines[1][0], end=lines[1][1], radius=surface.radius,
+                   velocity=velocity)
 
     def balls(self, towards: np.ndarray, radius: float) -> np.ndarray:
         """(N, 3) m: the centre of a ball of `radius` m that leaves along `towards` (N, 3)."""
@@ -97,13 +98,14 @@ def shoot(
         if length(starts - target).min() < ball.radius:
             raise InputError(what, "the target is where the ball is struck", "a target some way off", "move the target")
         aimed = along_ground(starts, target, ball, seconds, fastest=fastest) if ground else \
-            aim(starts, target, ball, seconds, bounces, spin, fastest, launch, about=about)
+            aim(starts, target, ball, seconds=seconds, bounces=bounces, spin=spin, fastest=fastest, near=launch,
+                about=about)
         towards, launch, about = aimed.velocity, aimed.velocity, aimed.seconds
     if ground:
         starts[:, 2] = ball.radius
     if not aimed.possible.any():
         best = int(np.argmin(np.where(aimed.miss <= CLOSE, length(aimed.velocity), np.inf)))
-        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, best, fastest, what)
+        raise out_of_reach(starts, np.broadcast_to(target, starts.shape), aimed, index=best, fastest=fastest, what=what)
     return Shot(strikes.frames, starts, aimed, _chosen(strikes, aimed))
 
 

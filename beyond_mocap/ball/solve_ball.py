@@ -39,6 +39,7 @@ def solve_ball(
     playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
     players = [source.players[index] for index in playing]
     return solve(
-        source.times[part], source.ball[part], source.positions[playing][:, part], [player.id for player in players],
-        [player.team for player in players], (source.length, source.width), source.provider, progress, cancelled,
+        source.times[part], source.ball[part], source.positions[playing][:, part],
+        players=[player.id for player in players], teams=[player.team for player in players],
+        pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled,
     )  # fmt: skip

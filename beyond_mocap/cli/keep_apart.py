@@ -23,7 +23,7 @@ def read_others(paths: Sequence[Path]) -> list[Follower]:
     """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
     motions = [(path.name, bvh.read(path).motion) for path in paths]
     return [
-        Follower(name, np.arange(len(motion)) / motion.fps, motion.root_positions - (0.0, 0.0, _HIPS))
+        Follower(name=name, times=np.arange(len(motion)) / motion.fps, places=motion.root_positions - (0.0, 0.0, _HIPS))
         for name, motion in motions
     ]
 
@@ -48,7 +48,8 @@ def clear_of(
 
 def _follower(name: str, ridden: Ridden) -> Follower:
     times = np.arange(len(ridden.motion)) / ridden.motion.fps
-    return Follower(name, times, np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]]))
+    return Follower(name=name, times=times,
+                    places=np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]]))
 
 
 def _with(settings: RideSettings, change: Change, fps: float) -> RideSettings:

@@ -40,9 +40,8 @@ def run(options, told: Told) -> None:
         raise InputError(options.propose, what, "a new file", "choose another name, then put the rows together")
     known = keep.read(options.learned) if options.learned else None
     if options.learn:
-        examples = examples_of(
-            options.library, options.unit, told.progress, options.cache, told.cancelled, told.note
-        )
+        examples = examples_of(options.library, options.unit, told.progress, cache_dir=options.cache,
+                               cancelled=told.cancelled, note=told.note)
         known = trained(examples, told.progress, told.cancelled)
         keep.write(options.learn, known)
         told.end()

@@ -66,7 +66,7 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     model = None if options.model is None else _model(options.model)
     loaded = time.perf_counter()
     try:
-        made = reconstruct(trial, static, model, settings, told.progress, told.cancelled)
+        made = reconstruct(trial, static, model, settings=settings, progress=told.progress, cancelled=told.cancelled)
     except InputError as error:
         raise _with_file(error, options) from None
     made.seconds.update(load=loaded - begun, total=time.perf_counter() - begun)
@@ -122,7 +122,8 @@ def _run_folder(options, told: Told) -> None:
     _check_folder(options.out, options.trial)
     read = partial(read_trial, options=options)
     rows = []
-    for made in reconstruct_folder(options.trial, read, settings, model, told.progress, told.cancelled):
+    for made in reconstruct_folder(options.trial, read, settings, model=model, progress=told.progress,
+                                   cancelled=told.cancelled):
         rows.append(_kept(made, options))
         told.end()
         print(rows[-1]["line"])

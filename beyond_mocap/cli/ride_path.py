@@ -146,7 +146,8 @@ def _apart(source, path, settings, ground, options):
 
     others = read_others(options.avoid)
     with _naming_files(options):
-        return clear_of(others, options.distance or DISTANCE, source, path, settings, ground, options.input.name)
+        return clear_of(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
+                        name=options.input.name)
 
 
 @contextmanager

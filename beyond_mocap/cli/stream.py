@@ -26,7 +26,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..passes.stream.sender import Sender
 
     way = "tcp" if options.tcp else "serve" if options.serve else "udp"
-    sender = Sender(options.clip, options.port, way, options.form, options.fps, options.loop)
+    sender = Sender(options.clip, options.port, way, form=options.form, rate=options.fps, loop=options.loop)
     print(
         f"sending {options.clip.name} to port {options.port} of this machine ({way.upper()}, {options.form})",
         flush=True,

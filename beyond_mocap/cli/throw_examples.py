@@ -26,9 +26,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..throws.throw_examples import TABLE_NAME
 
     begun = time.perf_counter()
-    count = write_planted(
-        options.out, options.action, options.subjects, options.throws, options.seed, told.progress, told.cancelled
-    )
+    count = write_planted(options.out, options.action, options.subjects, count=options.throws, seed=options.seed,
+                          progress=told.progress, cancelled=told.cancelled)
     told.end()
     seconds = time.perf_counter() - begun
     who = "person" if options.subjects == 1 else "people"

@@ -17,7 +17,7 @@ NORMALITY = 0.05
 """Level of the test for normality; he names none."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Comparison:
     """differences (N,): new - old by subject; negative ones are for the new way. mean; spread: standard deviation
     divided by n, as he prints it. normal: p of Shapiro and Wilk, NaN where there are too few or all alike. test:
@@ -41,14 +41,16 @@ def judged(differences: np.ndarray) -> Comparison:
     off = np.asarray(differences, float)
     if not len(off):
         none = float("nan")
-        return Comparison(off, none, none, none, "t", none, none, none, none)
+        return Comparison(differences=off, mean=none, spread=none, normal=none, test="t", p=none, t_p=none,
+                          wilcoxon_p=none, least_p=none)
     varies = len(off) > 1 and np.ptp(off) > 1e-12
     normal = float(shapiro(off).pvalue) if len(off) > 2 and varies else np.nan
     t_p = float(ttest_1samp(off, 0.0, alternative="less").pvalue) if varies else np.nan
     ranks = float(wilcoxon(off, alternative="less").pvalue) if np.any(off != 0.0) else np.nan
     test = "Wilcoxon" if normal < NORMALITY else "t"
-    return Comparison(off, float(off.mean()), float(off.std()), normal, test, ranks if test == "Wilcoxon" else t_p, t_p,
-                      ranks, 2.0 ** -len(off) if test == "Wilcoxon" else 0.0)
+    return Comparison(differences=off, mean=float(off.mean()), spread=float(off.std()), normal=normal, test=test,
+                      p=ranks if test == "Wilcoxon" else t_p, t_p=t_p, wilcoxon_p=ranks,
+                      least_p=2.0 ** -len(off) if test == "Wilcoxon" else 0.0)
 
 
 def kept(values: np.ndarray) -> np.ndarray:

@@ -18,7 +18,7 @@ from ..synthesis.quality.moments import Moment, met, touching_words, written_bal
 from .view import View
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PerFrame:
     """Figures of T output frames, NaN where nothing is known.
 
@@ -44,7 +44,7 @@ class PerFrame:
         return self.speed - self.asked_speed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Footprint:
     """One stance. side: 0 left, 1 right. start, end: its first and last second. heel, toe: mean places (2,) m of the
     foot's joints on the ground; where they are the same the foot has no toe joint. direction: radians of the foot, from
@@ -59,7 +59,7 @@ class Footprint:
     slide: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Strike:
     """One key moment in space. time: seconds; words: what was asked. part: the point (3,) m of the body's striking
     surface that is nearest to the ball's centre, ball: that centre (3,) m, gap: metres between both surfaces; where no
@@ -114,10 +114,8 @@ def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
     if np.hypot(*along) < 1e-3:  # no toe joint: the foot points where the body goes
         along = played.pelvis[min(end, view.count - 1)] - played.pelvis[max(first - 1, 0)]
     direction = float(np.arctan2(along[1], along[0]))
-    return Footprint(
-        side, float(played.times[first]), float(played.times[end - 1]), tuple(heel.tolist()), tuple(toe.tolist()),
-        direction, slide,
-    )  # fmt: skip
+    return Footprint(side=side, start=float(played.times[first]), end=float(played.times[end - 1]),
+                     heel=tuple(heel.tolist()), toe=tuple(toe.tolist()), direction=direction, slide=slide)  # fmt: skip
 
 
 def strikes(view: View) -> tuple[Strike, ...]:
@@ -133,13 +131,13 @@ def _strike(view: View, moment: Moment) -> Strike:
         part = played.positions[moment.frame, played.body.hips]
         if found:
             part = faster_middle(found, *_around(view, moment.frame))[-1]
-        return Strike(moment.asked.in_force, moment.asked.words, part, None, np.nan)
+        return Strike(time=moment.asked.in_force, words=moment.asked.words, part=part, ball=None, gap=np.nan)
     frame = int(np.clip(round((when - played.start_time) * view.fps), 0, view.count - 1))
     ball = written_ball(played, frame)
     lines = [surface.line(played.positions[frame], played.rotations[frame]) for surface in found]
     skins = [_skin(nearest_on(line, ball), ball, surface.radius) for line, surface in zip(lines, found)]
     part = min(skins, key=lambda point: float(np.linalg.norm(point - ball)))
-    return Strike(when, moment.asked.words, part, ball, gap)
+    return Strike(time=when, words=moment.asked.words, part=part, ball=ball, gap=gap)
 
 
 def _skin(inside: np.ndarray, ball: np.ndarray, radius: float) -> np.ndarray:

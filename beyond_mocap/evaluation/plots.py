@@ -156,7 +156,7 @@ def _draw_feet(ax, view: View) -> None:
     for side, (name, colour) in enumerate(_SIDES.items()):
         ax.plot(times, 100 * toes[:, side], color=colour, lw=1, label=f"{name} toe")
         stands = view.played.contacts[:, side]
-        _bars(ax, view, stands, -5.0 - 4.0 * side, colour, 3.0)
+        _bars(ax, view, stands, bottom=-5.0 - 4.0 * side, colour=colour, height=3.0)
     ax.set_ylim(bottom=-11.0)
     ax.set_title("toe heights; bars: foot in contact", loc="left", fontsize=9.5)
     ax.set_ylabel("cm")

@@ -28,7 +28,7 @@ POSES_PER_SECOND = 10.0
 LEFT_OUT_POSES = 3000
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Recording:
     """One uncut clip at the output's rate, T frames, measured.
 
@@ -55,7 +55,7 @@ class Recording:
     travel: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LibraryReference:
     """A library's recordings at `fps`, one after the other (N frames), and what is real for them.
 

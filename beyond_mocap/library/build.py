@@ -60,8 +60,9 @@ def build(
             found["notes"] += tuple(waiting)
             return Library(folder=str(folder), kept=(place, key), **found)
     notes: list[str] = [where] if where else []
-    clips = _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled)
-    built = _index(str(folder), clips, tuple(notes), seed, report, cancelled)
+    clips = _read_clips(folder, paths, files, annotations=annotations, chosen=chosen, unit=unit, threads=threads,
+                        notes=notes, report=report, cancelled=cancelled)
+    built = _index(str(folder), clips, tuple(notes), seed=seed, report=report, cancelled=cancelled)
     write_synthetic_clips(place, _completed(built.clips))
     if not cache.save(place, key, built):
         told = (
@@ -80,7 +81,7 @@ def _completed(clips: Iterable[Clip]) -> list[Clip]:
 
 def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes, report, cancelled) -> tuple[Clip, ...]:
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
-    read, unpopped, level = zip(*_read_files(paths, files, unit, threads, report, cancelled))
+    read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
     notes += _unit_notes(read)
     carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
     mended, rows = [], []
@@ -133,9 +134,10 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
     for name, one, own, flies in zip(names, mended, rows, flying):
         if flies:
             ends.append(landings.completed(one.motion, own, one.standing, ways))
-            clips.append(Clip(name, False, ends[-1].motion, ends[-1].rows, ends[-1].standing, ends[-1].recorded))
+            clips.append(Clip(path=name, mirrored=False, motion=ends[-1].motion, annotations=ends[-1].rows,
+                              standing=ends[-1].standing, recorded=ends[-1].recorded))
         else:
-            clips.append(Clip(name, False, one.motion, own, one.standing))
+            clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
     notes += landings.told(ends, ways)
     return clips
 
@@ -175,7 +177,8 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
         _check(cancelled)
         report(0.8 + 0.06 * number, f"Clustering blocks of {length} frames")
         clusters[length] = cluster_blocks(frames, length, seed)
-    return Library(folder, clips[0].motion.skeleton, clips, frames, clusters, FPS, notes)
+    return Library(folder=folder, skeleton=clips[0].motion.skeleton, clips=clips, frames=frames, clusters=clusters,
+                   fps=FPS, notes=notes)
 
 
 def _check(cancelled) -> None:

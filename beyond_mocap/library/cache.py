@@ -145,7 +145,8 @@ def _restore(header: dict, arrays: dict) -> dict:
         motion = Motion(skeleton, arrays["root"][part], arrays["rotations"][part], fps)
         rows = tuple(ClipAnnotation(row["start"], row["end"], row["key"], tuple(row["words"])) for row in rows)
         mended = mended and Mended(**mended)
-        clips.append(Clip(path, mirrored, motion, rows, arrays["standing"][part], recorded, mended))
+        clips.append(Clip(path=path, mirrored=mirrored, motion=motion, annotations=rows,
+                          standing=arrays["standing"][part], recorded=recorded, mended=mended))
         start += count
     frames = Frames(
         vocabulary=tuple(header["vocabulary"]), **{name: arrays[f"frames.{name}"] for name in _FRAME_ARRAYS}

@@ -14,7 +14,7 @@ from .landings import LANDING_FOLDER
 from .made import MADE_FOLDER
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Clip:
     """One recording or its mirrored twin.
 
@@ -64,4 +64,5 @@ class Clip:
         """The same clip with left and right exchanged (Faustino §3.1.2), words too."""
         rows = tuple(replace(row, words=tuple(swap_sides(row.words))) for row in self.annotations)
         standing = self.standing[:, ::-1]
-        return Clip(self.path, not self.mirrored, mirror(self.motion), rows, standing, self.recorded, self.mended)
+        return Clip(path=self.path, mirrored=not self.mirrored, motion=mirror(self.motion), annotations=rows,
+                    standing=standing, recorded=self.recorded, mended=self.mended)

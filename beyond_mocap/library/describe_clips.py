@@ -15,7 +15,7 @@ def described(clips, like: Frames | None = None) -> Frames:
     vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
     words_of = lambda clip, source: words_matrix(clip, source, vocabulary)  # noqa: E731
     with threadpool_limits(limits=1):  # with more, sums of products come out in another order
-        return describe(clips[0].motion.skeleton, clips, words_of, vocabulary, FPS, like)
+        return describe(clips[0].motion.skeleton, clips, words_of, vocabulary=vocabulary, fps=FPS, like=like)
 
 
 def words_matrix(clip: Clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:

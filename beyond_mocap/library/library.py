@@ -40,7 +40,7 @@ class Gait:
     speed: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Library:
     """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was
     decided; kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for
@@ -146,7 +146,7 @@ def _made(library: Library) -> Library:
     speeds = {gait.word: gait.speed for gait in library.gaits if gait.word != STANDING}
     clips = []
     for made in made_clips(library.clips, library.frames, library.fps, speeds, library.keys):
-        clip = Clip(made.name, False, made.motion, made.rows, made.standing)
+        clip = Clip(path=made.name, mirrored=False, motion=made.motion, annotations=made.rows, standing=made.standing)
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())

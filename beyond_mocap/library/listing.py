@@ -30,7 +30,7 @@ _LEAST_JERK = 40.0  # m/s^3: a body that stands still has next to none, and is n
 _HEAD = 1 << 16  # bytes of a file's head in which its number of frames stands
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Listed:
     """One clip. path: below the library's folder. words: all that it carries, key moments' first. moments: number of
     key moments. seconds: its length. speed, fastest: m/s, mean and highest, NaN where nobody has measured. mark: GOOD,
@@ -59,7 +59,9 @@ def listed(library: Library) -> tuple[Listed, ...]:
         mean, fastest = float(speed[part].mean()), float(speed[part].max())
         mark, told = _quality(clip, mean, float(np.median(ratio[part])))
         seconds = clip.recording.duration
-        out.append(Listed(clip.path, *words_of(clip.annotations), seconds, mean, fastest, mark, told))
+        words, keys = words_of(clip.annotations)
+        out.append(Listed(path=clip.path, words=words, moments=keys, seconds=seconds, speed=mean, fastest=fastest,
+                          mark=mark, told=told))
     return tuple(out)
 
 
@@ -80,7 +82,9 @@ def scanned(folder: str | Path, cache_dir: str | Path | None = None) -> tuple[Li
         waits = is_foreign(path) and not conversions.stands(path)
         told = ("waits for: conversion (Build Library)",) if waits else ()
         seconds = max(frames - 1, 0) / fps if fps else 0.0
-        out.append(Listed(path.relative_to(folder).as_posix(), *words_of(rows), seconds, told=told))
+        words, keys = words_of(rows)
+        out.append(Listed(path=path.relative_to(folder).as_posix(), words=words, moments=keys, seconds=seconds,
+                          told=told))
     return tuple(out)
 
 

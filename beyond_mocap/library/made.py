@@ -123,13 +123,13 @@ def made_clips(
     example = upright_example(clips)
     style = runner_style(clips, frames, example)
     for low, high in gaps(frames.speed[locomotion(frames, clips)], fps):
-        yield from _blends(clips, frames, fps, low, high, speeds)
+        yield from _blends(clips, frames, fps, low=low, high=high, speeds=speeds)
         yield from _runs(max(0.93 * low, _RUNS_FROM), min(1.05 * high, FASTEST), example, style, speeds)
     kinds = sorted({"inside" if "inside" in key.words else "top" for key in keys if KICK <= key.words})
     fastest = touch_speed(frames, clips, keys, KICK)
-    yield from _touches(KICKED, _TOUCH_STEP * fastest, ("kick", "low"), kinds, example, speeds)
+    yield from _touches(KICKED, _TOUCH_STEP * fastest, ("kick", "low"), kinds=kinds, example=example, speeds=speeds)
     fastest = max(_TOUCH_STEP * touch_speed(frames, clips, keys, TAKE), TAKES_FROM)
-    yield from _touches(TAKEN, fastest, ("receive", "foot", "low"), ["inside"], example, speeds)
+    yield from _touches(TAKEN, fastest, ("receive", "foot", "low"), kinds=["inside"], example=example, speeds=speeds)
 
 
 def upright_example(clips: Sequence) -> Motion:

@@ -73,7 +73,7 @@ def gaits_of(library: Library) -> tuple[tuple[str, float], ...]:
     return tuple(zip([gait.word for gait in library.gaits], [0.0, *library.gait_thresholds.tolist()]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Seen:
     """What the rules look at. places (T, J, 3) m; speed (T,) m/s of the pelvis over the ground; path (T, 2) m/s its
     velocity; facing (T,) radians; leg, floor: m; upright (T,): share of the trunk's direction that points up."""
@@ -98,8 +98,8 @@ class _Seen:
         upright = trunk[:, 2] / np.maximum(np.linalg.norm(trunk, axis=1), 1e-9)
         facing = np.unwrap(heading_from_positions(motion.skeleton, places))
         floor = contacts.ground_height(motion)
-        return cls(motion, body, places, world, np.linalg.norm(path, axis=1), path, facing,
-                   leg_length(motion.skeleton), floor, upright)
+        return cls(motion=motion, body=body, places=places, world=world, speed=np.linalg.norm(path, axis=1), path=path,
+                   facing=facing, leg=leg_length(motion.skeleton), floor=floor, upright=upright)
 
     def row(self, start: float, end: float, words, key: int | None = None) -> ClipAnnotation:
         last = len(self.motion) - 1

@@ -46,7 +46,7 @@ _SINKS = 0.10  # metres that a suit's pelvis may be too high above its feet
 _BALL = 0.7  # of the way from ankle to the foot's tip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Repaired:
     """A mended clip and what was done.
 
@@ -147,7 +147,8 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
         motion, travel = _travelled(motion, standing)
     if slid or plants:
         motion = held(motion, standing)
-    return Repaired(_on_floor(motion), standing, drift, travel, (before, slide(motion, standing)), slid)
+    return Repaired(motion=_on_floor(motion), standing=standing, drift=drift, travel=travel,
+                    slide=(before, slide(motion, standing)), slid=slid)
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
@@ -161,9 +162,8 @@ def slides(motion: Motion, standing: np.ndarray) -> bool:
 def held(motion: Motion, standing: np.ndarray) -> Motion:
     """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at the heights they
     have."""
-    planted = plant(
-        motion.skeleton, motion.root_positions, motion.rotations, standing, motion.fps, _SINKS, levels=False
-    )
+    planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
+                    sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 

@@ -30,7 +30,7 @@ _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model 
 Progress = Callable[[float, str], None]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ReconstructSettings:
     """What may be chosen; the settings table says what each means. marker_set: None: the shipped set that fits.
     release: "auto": looked for where a marker is on a ball, or the file's name tells a throw's speed."""
@@ -57,7 +57,7 @@ class ReconstructSettings:
             raise InputError("smoothness", f"{self.smoothness} s", _SMOOTHNESS.limits_text(least, most))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Reconstruction:
     """What came out.
 
@@ -114,7 +114,8 @@ def reconstruct(
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # the same bits everywhere; and small systems are slower on several
-        return _reconstruct(trial, static, model, settings, _Road(progress, cancelled), cancelled)
+        return _reconstruct(trial, static, model, settings=settings, road=_Road(progress, cancelled),
+                            cancelled=cancelled)
 
 
 def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Road, cancelled) -> Reconstruction:
@@ -134,7 +135,7 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
             model = _calibrated(marker_set, told, still, road.inner(0.1, 0.45), cancelled)
             road.tell(model.notes)
     with road.step("pose", 0.85):
-        solved = _posed(model, told, marker_set, settings, road, cancelled)
+        solved = _posed(model, told, marker_set, settings=settings, road=road, cancelled=cancelled)
         road.tell([*solved.notes, *_far_off(solved, model)])
     with road.step("filter", 0.92):
         motion, held = _filtered(solved, model, seen, settings, road)
@@ -143,11 +144,10 @@ def _reconstruct(trial, static, model, settings: ReconstructSettings, road: _Roa
         down = floor if settings.floor else 0.0
         motion, tidy, seen = moved_down(motion, down), _lowered(tidy, down), _lowered(seen, down)
     with road.step("release", 1.0):
-        found = _release(seen, motion, model, marker_set, settings, road)
-    return Reconstruction(
-        motion, model, tidy, trial, solved, cleaned, found, held, floor, settings.floor, road.seconds,
-        tuple(road.warnings),
-    )
+        found = _release(seen, motion, model, marker_set=marker_set, settings=settings, road=road)
+    return Reconstruction(motion=motion, model=model, trial=tidy, raw=trial, solved=solved, cleaned=cleaned,
+                          release=found, held=held, floor=floor, grounded=settings.floor, seconds=road.seconds,
+                          warnings=tuple(road.warnings))
 
 
 class _Road:
@@ -293,13 +293,15 @@ def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _
         if settings.hold_ball:
             road.tell(["no marker on a ball: nothing is held"])
         return solved
-    found = _release(trial, solved.motion, model, marker_set, replace(settings, release="auto"), road)
+    found = _release(trial, solved.motion, model, marker_set=marker_set, settings=replace(settings, release="auto"),
+                     road=road)
     if found is None or found.how != "ball":
         road.tell([f"{label} does not tell how the ball is held: it takes no part in the pose"])
         return solved
     hand = f"{found.side.capitalize()}Hand"
     held = np.arange(len(trial)) < found.frame
-    ball = HeldBall(hand, found.centre, found.radius, trial.positions[:, trial.index(label)], held)
+    ball = HeldBall(joint=hand, centre=found.centre, radius=found.radius, seen=trial.positions[:, trial.index(label)],
+                    held=held)
     return solve(model, trial, replace(how, ball=ball), road.inner(0.65, 0.85), cancelled)
 
 

@@ -41,7 +41,7 @@ class Recording:
         return bool(_STATIC.search(self.path.stem))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Made:
     """What became of one trial: the reconstruction, or the error that says why there is none. static: its static, or
     None. note: why a static that was there is not its own, or ""."""
@@ -85,10 +85,11 @@ def reconstruct_folder(
         if cancelled is not None and cancelled():
             raise Cancelled("cancelled")
         part = _part_of(progress, number, len(plans), plan.recording.name)
-        yield _made(plan, read, settings, model or models.get(plan.static_path), part, cancelled)
+        yield _made(plan, read, settings, model=model or models.get(plan.static_path), progress=part,
+                    cancelled=cancelled)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Plan:
     """A trial, its static as read or None, why it cannot be read, and why a static is not its own."""
 
@@ -124,9 +125,9 @@ def _planned(one: Recording, read: Read, statics, settings: ReconstructSettings)
     try:
         trial = read(one.path)
         static, note = _static_for(one, trial, statics, settings)
-        return _Plan(one, static, subject=trial.subject, note=note)
+        return _Plan(recording=one, static=static, subject=trial.subject, note=note)
     except (BeyondMocapError, OSError) as error:
-        return _Plan(one, error=str(error))
+        return _Plan(recording=one, error=str(error))
 
 
 def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
@@ -180,15 +181,16 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
 
 def _made(plan: _Plan, read: Read, settings, model, progress, cancelled) -> Made:
     if plan.error:
-        return Made(plan.recording, None, plan.error)
+        return Made(recording=plan.recording, made=None, error=plan.error)
     static, still = plan.static or (None, None)
     try:
-        made = reconstruct(read(plan.recording.path), still, model, settings, progress, cancelled)
+        made = reconstruct(read(plan.recording.path), still, model, settings=settings, progress=progress,
+                           cancelled=cancelled)
     except Cancelled:
         raise
     except (BeyondMocapError, OSError) as error:
-        return Made(plan.recording, None, str(error), static)
-    return Made(plan.recording, made, static=static, note=plan.note)
+        return Made(recording=plan.recording, made=None, error=str(error), static=static)
+    return Made(recording=plan.recording, made=made, static=static, note=plan.note)
 
 
 def _part_of(progress, number: int, count: int, name: str):

@@ -26,7 +26,7 @@ class MarkerEvent:
     side: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MarkerTrial:
     """Markers over time: T frames of M markers.
 

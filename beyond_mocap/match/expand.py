@@ -73,7 +73,7 @@ def expanded(
     return tuple(takes)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Window:
     """Frames low .. high of a stretch at the output's rate, laid out with those around them as `take`, whose first
     frame is frame `first` of the stretch. standing: (T, 2) bool of its feet, heel or toe."""
@@ -128,7 +128,7 @@ class _Layout:
         shown_here = self._shown(plan, first * FPS / self.fps)
         resolved = resolve_plan(plan, self.library, touches_solved=True)
         take = constructed(self.library, resolved, shown_here)
-        return _Window(low, high, first, take, self._standing(shown_here, take))
+        return _Window(low=low, high=high, first=first, take=take, standing=self._standing(shown_here, take))
 
     def _shown(self, plan: Plan, at: float) -> EditList:
         """What is shown in the time of a plan that begins at frame `at` (fractional) of the stretch, at the library's
@@ -166,7 +166,8 @@ def _handed_over(before: _Window, window: _Window, settled: int) -> Take:
     places[:hand], turns[:hand] = old.motion.root_positions[then], old.motion.rotations[then]
     standing = np.repeat(window.standing[at][:, :, None], 2, axis=2)
     root, rotations = take.motion.root_positions.copy(), take.motion.rotations.copy()
-    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share, standing, fps)
+    root[at], rotations[at] = handed_over(take.motion.skeleton, new, (places, turns), share=share, standing=standing,
+                                          fps=fps)
     motion = replace(take.motion, root_positions=root, rotations=rotations)
     return replace(take, motion=motion, ball=_ball_handed(old.ball, take.ball, then, at.start, share[:hand]))
 

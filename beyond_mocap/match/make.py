@@ -55,7 +55,7 @@ class MadePlayer:
     reason: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MatchResult:
     """order: what was asked. span: (start, end) s. done, failed: who was made, and who was not. notes: lines for
     people."""
@@ -96,7 +96,8 @@ def make_match(
         state.told["notes"] += folder.notes
         state.seconds["read"] = round(read[0] - clock[0], 3)
         state.took("library", read)
-        job = stages.Job(order, folder, state, source, library, place, report, cancelled)
+        job = stages.Job(order=order, folder=folder, state=state, source=source, library=library, place=place,
+                         report=report, cancelled=cancelled)
         try:
             with threadpool_limits(limits=1):  # more threads add up in another order
                 _make(job, match, events, span, report)
@@ -144,7 +145,8 @@ def _make(
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
     roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
     names = file_names(player.id for player in match.players)
-    parts = parts_of(roles, names, words, solved, job.order, job.folder, job.library.words)
+    parts = parts_of(roles, names, words, solved=solved, order=job.order, folder=job.folder,
+                     known_words=job.library.words)
     told = job.folder.before.get("players", ())
     finished = {row["id"]: row["finished"] for row in told if isinstance(row.get("finished"), str)}
     state.players = {part.role.player.id: row_of(part, finished.get(part.role.player.id)) for part in parts}
@@ -234,7 +236,8 @@ def result_of(order: MatchOrder) -> MatchResult:
     made = {status: tuple(MadePlayer(row["id"], row.get("reason", "")) for row in told["players"]
                           if row["status"] == status) for status in ("done", "failed")}  # fmt: skip
     notes = tuple(dict.fromkeys((*told["data"], *told["notes"])))
-    return MatchResult(order, (told["from_s"], told["to_s"]), made["done"], made["failed"], notes)
+    return MatchResult(order=order, span=(told["from_s"], told["to_s"]), done=made["done"], failed=made["failed"],
+                       notes=notes)
 
 
 def _part(report: Progress, stage: str) -> Progress:

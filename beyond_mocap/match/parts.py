@@ -41,7 +41,8 @@ def parts_of(
     for role in roles:
         file = files[role.player.id]
         try:
-            moments = () if role.reason else _moments(file, role, words, order, folder, known_words)
+            moments = () if role.reason else _moments(file, role, words, order=order, folder=folder,
+                                                      known_words=known_words)
             plans = tuple(_plan(role, number, moments, solved, order) for number in range(len(role.asked)))
             unused = tuple(one for one in moments if one.source == USER and not _is_used(one, role))
             out.append(Part(role, file, () if role.reason else plans, unused))

@@ -56,7 +56,7 @@ def kept(plan: Plan) -> Plan:
     track = plan.track
     track = Track(
         np.round(track.times * 1e6) / 1e6, _to_millimetres(track.positions), _to_millimetres(track.ball),
-        track.ball_height_known, track.filled, track.outlier, track.name,
+        ball_height_known=track.ball_height_known, filled=track.filled, outlier=track.outlier, name=track.name,
     )  # fmt: skip
     return replace(plan, track=track, solved=None if plan.solved is None else _kept_course(plan.solved, track))
 

@@ -24,7 +24,7 @@ NEAR_SAMPLES = 2.0
 """Times a second at which it is looked who is near whom."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Role:
     """A player who is to be made. player: who; measured: his cleaned tracks, one for each stretch in which he is there,
     each from a frame of the match's clock (a whole number of 1 / fps seconds) to another; asked: the same, pushed out
@@ -101,8 +101,10 @@ def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, flo
                 tracks.append(_cut(track, begin, end, fps))
                 notes += found.lines
     except InputError as error:
-        return Role(player, reason=str(error), number=number)
-    return Role(player, tuple(tracks), tuple(tracks), tuple(notes), number=number) if tracks else None
+        return Role(player=player, reason=str(error), number=number)
+    return Role(
+        player=player, measured=tuple(tracks), asked=tuple(tracks), notes=tuple(notes), number=number,
+    ) if tracks else None
 
 
 def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:

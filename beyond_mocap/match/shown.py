@@ -66,7 +66,8 @@ def _finished(library: Library, take: Take, correction: Correction | None, ball:
         return take
     own = _cut(ball, first, len(take.motion), take.motion.fps)
     known = np.isfinite(own.positions).all(axis=1)
-    motion = looking(take.motion, own.positions, known, look_of(library), take.plan.seed, take.start_time)
+    motion = looking(take.motion, own.positions, known, look=look_of(library), seed=take.plan.seed,
+                     start=take.start_time)
     return at_ball(replace(take, motion=motion, ball=own), own.positions)
 
 

@@ -266,7 +266,8 @@ def _track(row, where: str, array) -> Track:
     flags = array("flags", None, len(times)).astype(int)
     known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
     ball = places(array("ball", 3, len(times)), f"{where}: ball")
-    return Track(times, positions, ball, known, filled, outlier, text(row["name"], f"{where}: name"))
+    return Track(times, positions, ball, ball_height_known=known, filled=filled, outlier=outlier,
+                 name=text(row["name"], f"{where}: name"))
 
 
 def _course(row, where: str, array, first: float, last: float) -> SolvedCourse | None:
@@ -295,7 +296,7 @@ def _edit(row, where: str, array) -> NamedEdit:
     if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
         raise InputError(f"{where}: first, rate", "more than any clip has", f"frames to {_MOST_FRAMES:g}")
     keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
-    return NamedEdit(clips, **runs, keys=keys)
+    return NamedEdit(clips=clips, **runs, keys=keys)
 
 
 def _named_key(value, clips: int, where: str) -> NamedKey:
@@ -303,4 +304,5 @@ def _named_key(value, clips: int, where: str) -> NamedKey:
     if not 0 <= whole_number(clip, where) < clips:
         raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
     frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(number(time, where), whole_number(clip, where), frame, start, end, _words(words, where))
+    return NamedKey(time=number(time, where), clip=whole_number(clip, where), frame=frame, start=start, end=end,
+                    words=_words(words, where))

@@ -63,7 +63,7 @@ class Planted:
     miss: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Foot:
     """One foot laid out: hip, heel (the ankle joint) and toe (T, 3) m, rotation (T, 4) in the world, left (T, 3) level
     across it, weight (T, 2) of heel and toe, length (T,) m of its leg and `own`,
@@ -134,7 +134,7 @@ def plant(
     firm = [foot.weight for foot in feet]
     for turn in range(_EASED_ROUNDS + 1):
         goals = [
-            _goal(foot, weight, lift, tilt, scale, spread)
+            _goal(foot, weight, lift, tilt=tilt, scale=scale, spread=spread)
             for foot, weight, lift, tilt in zip(feet, firm, lifts, np.moveaxis(moves[..., 3], 1, 0))
         ]
         drop = pelvis_drop(feet, [goal for goal, _ in goals], spread, sinks)
@@ -164,7 +164,8 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
     along = toe - heel if limb.toe is not None else quaternion.rotate(world[:, limb.foot], np.array([1.0, 0.0, 0.0]))
     yaw = arctan2(along[:, 1], along[:, 0])
     left = np.stack([-np.sin(yaw), np.cos(yaw), np.zeros(len(yaw))], axis=1)
-    return Foot(limb, hip, heel, toe, world[:, limb.foot], left, weight, length, own)
+    return Foot(limb=limb, hip=hip, heel=heel, toe=toe, rotation=world[:, limb.foot], left=left, weight=weight,
+                length=length, own=own)
 
 
 def firmness(stands: np.ndarray) -> np.ndarray:

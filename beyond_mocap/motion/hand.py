@@ -17,7 +17,7 @@ of the palm; it lies on the fingers' middle parts."""
 _HAND_OF_ARM = 0.72  # wrist to fingertip against elbow to wrist: 0.108 and 0.146 of the height, Drillis & Contini 1966
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Hand:
     """One hand over T frames.
 
@@ -61,10 +61,9 @@ def hand_of(motion: Motion, side: str) -> Hand:
         raise InputError("release", f"a skeleton without a {side} hand", "joints for the hand and the forearm")
     places, rotations = forward_kinematics(motion)
     finger, reach = _finger(motion, limb)
-    return Hand(
-        side, motion.fps, places[:, limb.hand], quaternion.to_matrix(rotations[:, limb.hand]), finger, reach,
-        places[:, limb.lower_arm],
-    )  # fmt: skip
+    return Hand(side=side, fps=motion.fps, origin=places[:, limb.hand],
+                rotation=quaternion.to_matrix(rotations[:, limb.hand]), finger=finger, reach=reach,
+                elbow=places[:, limb.lower_arm])  # fmt: skip
 
 
 def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:

@@ -61,7 +61,7 @@ class Limb:
         return self.foot if self.toe is None else self.toe
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Humanoid:
     """Joint indices by meaning. `spine`: the joints between hips and neck, from below."""
 
@@ -184,7 +184,8 @@ def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[st
     limbs = {side: Limb(**{part: roles.get(f"{side} {part}") for part in _LIMB_NAMES}) for side in ("left", "right")}
     mirror = _mirror([side_and_part(name) for name in names], parents, roles)
     neck, head = roles.get("neck"), roles.get("head")
-    return Humanoid(roles["hips"], tuple(spine), neck, head, limbs["left"], limbs["right"], mirror)
+    return Humanoid(hips=roles["hips"], spine=tuple(spine), neck=neck, head=head, left=limbs["left"],
+                    right=limbs["right"], mirror=mirror)
 
 
 def roles_of(body: Humanoid) -> dict[str, int]:

@@ -26,7 +26,7 @@ _NEAREST = 0.25
 _LEFT, _RIGHT = 0, 1
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Strides:
     """A stretch of steady locomotion that begins and ends with a landing.
 
@@ -63,7 +63,8 @@ class Strides:
 
     def later(self) -> "Strides":
         """The same without the first step."""
-        return Strides(self.motion, self.landings[1:], 1 - self.first, self.standing, self.facing, self.path)
+        return Strides(motion=self.motion, landings=self.landings[1:], first=1 - self.first, standing=self.standing,
+                       facing=self.facing, path=self.path)
 
 
 def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
@@ -77,7 +78,8 @@ def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
     positions, _ = forward_kinematics(motion)
     facing = np.unwrap(heading_from_positions(motion.skeleton, positions))
     path = zero_phase_hann(positions[:, 0, :2], motion.fps, _SWAY_SECONDS)
-    return Strides(motion, frames[first:last], int(sides[first]), standing, facing, path)
+    return Strides(motion=motion, landings=frames[first:last], first=int(sides[first]), standing=standing,
+                   facing=facing, path=path)
 
 
 def _landings(standing: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:

@@ -110,7 +110,8 @@ def player_motion(
     orders = sorted(orders, key=lambda order: order.time)
     _check(orders, ball.times, fps)
     with threadpool_limits(limits=1):
-        return _Body(library, stance, orders, ball, ball_radius, count, fps, settings).made(progress, cancelled)
+        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=count, fps=fps,
+                     settings=settings).made(progress, cancelled)
 
 
 def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) -> float:
@@ -204,7 +205,8 @@ class _Body:
                 words[frame] = None
         allowed = np.ones(len(library.clips), bool)
         avoided = tuple(strikes for _ in words) if strikes else ()
-        return Wanted(track, tuple(words), gait, Timeline(), keys, allowed, (), avoided)
+        return Wanted(track=track, asked=tuple(words), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed,
+                      warnings=(), avoided=avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
         order = hit.order
@@ -212,7 +214,8 @@ class _Body:
         frames = range(int(hit.first), int(hit.last) + 1)
         words = frozenset({_PART_LABELS.get(order.part, "kick"), order.side} - {""}).union(*map(clip.words_at, frames))
         key = Key(order.clip, float(order.strike_frame), hit.first, hit.last, words)
-        return WantedKey(KeyMoment(order.time, tuple(sorted(words))), frame, (key,), None, True, (1.0,))
+        return WantedKey(asked=KeyMoment(order.time, tuple(sorted(words))), frame=frame, choices=(key,),
+                         used_instead=None, ball_height_known=True, rates=(1.0,))
 
     def _track(self, times: np.ndarray, fps: float):
         """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
@@ -284,7 +287,7 @@ class _Body:
             frame = (order.time - self.start) * self.fps
             entry, leave = (frame - (hit.start - self.start) * self.fps, (hit.end - self.start) * self.fps - frame)
             ball = np.array(order.ball) if order.touches else np.full(3, np.nan)
-            out.append(Meeting(frame, surface, ball, self.ball_radius, entry, leave))
+            out.append(Meeting(frame, surface, ball, radius=self.ball_radius, entry=entry, leave=leave))
         return out
 
     def _warnings(self, struck: Met, track: SampledTrack) -> tuple[str, ...]:

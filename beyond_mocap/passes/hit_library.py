@@ -164,7 +164,9 @@ def _unseen(clip: Clip, part: str, sides, hits: list[HitMotion], tool: Tool | No
         if row.key is None or any(hit.first < row.key < hit.last and _names(row.words, part, hit.side) for hit in hits):
             continue
         named = [side for side in sides if _names(row.words, part, side)]
-        made = [hit_at(clip.recording, int(round(row.key)), _around(row, clip), part, side, tool) for side in named]
+        made = [hit_at(
+            clip.recording, int(round(row.key)), _around(row, clip), part=part, side=side, tool=tool,
+        ) for side in named]
         found += [hit for hit in sorted(made, key=lambda hit: -hit.max_speed)[:1] if hit.max_speed > _MOVES]
     return found
 

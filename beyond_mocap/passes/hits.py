@@ -38,7 +38,7 @@ _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HitMotion:
     """One hit motion (§3: S_H), all frames of its motion's own rate.
 
@@ -76,7 +76,7 @@ class HitMotion:
         return float(np.arctan2(self.velocity[1], self.velocity[0]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Hits:
     """What the hit analysis found in one motion.
 
@@ -122,7 +122,7 @@ def analyse(
     """
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, joint or part, side, tool)
+    place = strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
     side = side if part in _SIDED else ""
     body = _Body.of(motion, positions)
     way = _Way.of(place, body, part, motion.fps)
@@ -134,11 +134,10 @@ def analyse(
         other = _other_foot(motion.skeleton, positions, side, motion.fps) if part == "foot" else None
         spans = [span for span in spans if _is_hit(span, part, way, body, other)]
     found = tuple(_hit_motion(part, side, span, way, body) for span in spans)
-    return Hits(
-        part, side, motion.fps, level, way.height, way.speed, place,
-        tuple(sorted({*highs, *(one.high for one in found)})), tuple(_apart(way.speed, motion.fps)), found,
-        tuple(one.ball_stretch for one in found), _between(found, len(motion)),
-    )
+    return Hits(part=part, side=side, fps=motion.fps, threshold=level, height=way.height, speed=way.speed, place=place,
+                highs=tuple(sorted({*highs, *(one.high for one in found)})), fasts=tuple(_apart(way.speed, motion.fps)),
+                motions=found, ball_stretches=tuple(one.ball_stretch for one in found),
+                links=_between(found, len(motion)))
 
 
 def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
@@ -155,13 +154,13 @@ def hit_at(
     are fast, as in a trap, of which `analyse` sees nothing. InputError as there."""
     _check(motion, None)
     positions, rotations = forward_kinematics(motion)
-    place = strike_place(motion.skeleton, positions, rotations, part, side, tool)
+    place = strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
     body = _Body.of(motion, positions)
     first = int(np.clip(span[0], 0, len(motion) - 3))
     last = int(np.clip(span[1], first + 2, len(motion) - 1))
     key = int(np.clip(frame, first + 1, last - 1))
     side = side if part in _SIDED else ""
-    return _hit_motion(part, side, (first, last), _Way.of(place, body, part, motion.fps), body, key)
+    return _hit_motion(part, side, (first, last), way=_Way.of(place, body, part, motion.fps), body=body, key=key)
 
 
 def strike_place(
@@ -181,7 +180,7 @@ def _check(motion: Motion, threshold: float | None) -> None:
         raise InputError("motion", "values that are no numbers", "numbers in every frame")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Body:
     """What of the body hits are seen against: pelvis (T, 3) m and its level speed (T,) m/s, both smoothed; facing (T,)
     radians; ground: m, the height of the floor; size: leg length, m."""
@@ -200,10 +199,11 @@ class _Body:
         path = zero_phase_hann(pelvis[:, :2], motion.fps, 0.5)
         facing = np.unwrap(heading_from_positions(motion.skeleton, positions))
         speed = np.linalg.norm(_rate(path, motion.fps), axis=1)
-        return _Body(pelvis, speed, facing, float(np.percentile(toes, 2)), leg_length(motion.skeleton))
+        return _Body(pelvis=pelvis, speed=speed, facing=facing, ground=float(np.percentile(toes, 2)),
+                     size=leg_length(motion.skeleton))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Way:
     """The part's way, smoothed: place and velocity (T, 3) m and m/s, world; height (T,) m above the ground; speed (T,)
     m/s, of the head and the chest against the pelvis: a jump is faster than the nod that meets the ball."""
@@ -219,7 +219,8 @@ class _Way:
         smooth = zero_phase_hann(place, fps, _SMOOTHING)
         velocity = _rate(smooth, fps)
         against = _rate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
-        return _Way(smooth, velocity, smooth[:, 2] - body.ground, np.linalg.norm(against, axis=1), fps)
+        return _Way(place=smooth, velocity=velocity, height=smooth[:, 2] - body.ground,
+                    speed=np.linalg.norm(against, axis=1), fps=fps)
 
 
 def _other_foot(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
@@ -315,10 +316,10 @@ def _hit_motion(
     facing = float(np.arctan2(np.sin(turns).mean(), np.cos(turns).mean()))
     turn = quaternion.about_up(np.array(-facing))
     steps = np.diff(way.place[frames] - body.pelvis[frames] * [1.0, 1.0, 0.0], axis=0)
-    return HitMotion(
-        part, side, first, last, high, fasts, key, float(way.speed[list(fasts)].max()), quaternion.rotate(turn, steps),
-        np.diff(frames) / way.fps, quaternion.rotate(turn, way.velocity[key]), facing, body.size, way.fps,
-    )
+    return HitMotion(part=part, side=side, first=first, last=last, high=high, fasts=fasts, key=key,
+                     max_speed=float(way.speed[list(fasts)].max()), vectors=quaternion.rotate(turn, steps),
+                     times=np.diff(frames) / way.fps, velocity=quaternion.rotate(turn, way.velocity[key]),
+                     facing=facing, size=body.size, fps=way.fps)
 
 
 def _high(height: np.ndarray, first: int, key: int, last: int) -> int:

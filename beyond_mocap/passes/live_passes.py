@@ -56,7 +56,7 @@ class Played:
         return Stance(tuple(float(v) for v in one.root_positions[0, :2]), float(heading(one)[0]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Rally:
     """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does;
     ball: its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes:
@@ -83,7 +83,7 @@ class Rally:
         )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Piece:
     """One pass from standing to standing, its own clock from 0. motions: of giver and receiver; ball; strike: s;
     seconds: until the next can act; clip: which recording of the library the giver shows; warnings."""
@@ -112,11 +112,10 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
         if progress:
             progress(number / len(names), f"{player.name} stands")
         stance = Stance(player.place, scene.facing(player.name))
-        moved = player_motion(
-            library, stance, (), ball, radius, None, scene.fps, _settings(scene), cancelled=cancelled
-        )
+        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, frames=None, fps=scene.fps,
+                              settings=_settings(scene), cancelled=cancelled)
         players[player.name] = Played(start, _lasting(moved.take.motion))
-    return Rally(scene, holder, players, _on_from(None, ball, start), start, start)
+    return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
 
 
 def answer(
@@ -137,7 +136,7 @@ def answer(
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
     one = Pass(
-        rally.holder, target, kind_of(hit), bounces, hit.part, hit.side, example=Example("", hit=hit)
+        rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side, example=Example("", hit=hit)
     )
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
@@ -146,20 +145,19 @@ def answer(
             for player in rally.scene.players
         ),
     )
-    plan = _planned(library, scene, stances[rally.holder], lies, progress, cancelled)
+    plan = _planned(library, scene, stances[rally.holder], lies=lies, progress=progress, cancelled=cancelled)
     path = ball_path(plan)
     path = replace(path, positions=_rolled(path, lies, plan.strikes[0].order.time))
     motions = {}
     for name in (one.giver, one.receiver):
-        moved = player_motion(
-            library, stances[name], plan.orders(name), path, ball_of(scene).radius, None, scene.fps, _settings(scene),
-            cancelled=cancelled,
-        )
+        moved = player_motion(library, stances[name], plan.orders(name), ball=path, ball_radius=ball_of(scene).radius,
+                              frames=None, fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
         motions[name] = _lasting(moved.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
     seconds = strikes[-1].order.time + _STOPPED
-    return Piece(one.giver, target, motions, path, strikes[0].order.time, seconds, clip, plan.warnings)
+    return Piece(giver=one.giver, receiver=target, motions=motions, ball=path, strike=strikes[0].order.time,
+                 seconds=seconds, clip=clip, warnings=plan.warnings)
 
 
 def _settings(scene: PassScene) -> BodySettings:

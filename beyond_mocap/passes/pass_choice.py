@@ -74,7 +74,7 @@ class _Options:
         return quaternion.rotate(quaternion.about_up(self.facing), self.moments.struck.velocity)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Tried:
     """Flights (N) of a strike: from which option, starts (N, 3), target (3,), seconds, velocity (N, 3); cost (N,),
     infinite where it cannot be; reached: whether any comes to the target at all, net or no net."""
@@ -166,14 +166,15 @@ def _possible(court: Court, number: int, site: Site) -> StrikeMoments:
 
 def _simplest(options: _Options) -> Link:
     best = int(np.argmin(options.cost))
-    return Link(options.moments.only([best]), float(options.facing[best]), 0.0, np.zeros(3), options.natural)
+    return Link(moment=options.moments.only([best]), facing=float(options.facing[best]), seconds=0.0,
+                velocity=np.zeros(3), natural=options.natural)
 
 
 def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     """The option and the seconds of travel with which the natural velocity is changed least (step 8 for each): all
     times with the best option, then the best times with all."""
     seconds = seconds_of(court.passes[number], court.scene.fps)
-    tried = _tried(court, number, options, after, np.zeros(len(seconds), int), seconds)
+    tried = _tried(court, number, options, after=after, option=np.zeros(len(seconds), int), seconds=seconds)
     best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
     others = np.arange(1, len(options.cost))
     tried = tried.and_also(_tried(court, number, options, after, *_each(others, seconds[best])))
@@ -182,10 +183,9 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     best = int(np.argmin(tried.cost))
     option = int(tried.option[best])
     chosen = int(np.argmin(np.linalg.norm(options.natural.starts - tried.starts[best], axis=1)))
-    return Link(
-        options.moments.only([option]), float(options.facing[option]), float(tried.seconds[best]), tried.velocity[best],
-        replace(options.natural, chosen=chosen),
-    )  # fmt: skip
+    return Link(moment=options.moments.only([option]), facing=float(options.facing[option]),
+                seconds=float(tried.seconds[best]), velocity=tried.velocity[best],
+                natural=replace(options.natural, chosen=chosen))  # fmt: skip
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what is not possible may be faster than numbers go
@@ -198,7 +198,8 @@ def _tried(
     starts = options.centres(site, unit_vectors(natural), court.ball.radius)[option]
     target = court.ball_on(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
     spin = spun(starts, target, seconds, court.ball, site.kind)
-    aimed = aim(starts, target, court.ball, seconds, one.bounces, spin, fastest=court.fastest(number))
+    aimed = aim(starts, target, court.ball, seconds=seconds, bounces=one.bounces, spin=spin,
+                fastest=court.fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)
     ways, arriving = ways_of(*flights, court.ball), arrivals(*flights, court.ball)
     cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
@@ -209,7 +210,8 @@ def _tried(
     cost += rising(arriving) + lasting(seconds, site.kind)
     good = aimed.possible & (aimed.miss <= ON_TARGET)
     cost = np.where(good & court.clear(ways), cost, np.inf)
-    return _Tried(option, starts, target, seconds, aimed.velocity, cost, bool(good.any()))
+    return _Tried(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
+                  reached=bool(good.any()))
 
 
 def _pushes(site: Site, link: Link) -> np.ndarray:

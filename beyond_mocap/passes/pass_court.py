@@ -27,7 +27,7 @@ SERVED_SECONDS, SERVED_PER_METRE, LONGEST_SERVE = 0.5, 0.07, 3.0
 """How long it flies, how much longer for each metre, and at most."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Site:
     """Where, with what and how one of the strikes is to be made.
 
@@ -63,7 +63,7 @@ class Natural:
     chosen: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Link:
     """A strike as chosen: the option (a single moment), its facing rad, the seconds that the ball travels on from it,
     and about which velocity (3,) m/s it leaves with."""
@@ -130,7 +130,8 @@ class Court:
         """The launches (S) of a pass from `start` (S, 3) m to `target` (3,) m that take `seconds` (S,), and whether
         each is what a human can give and clear of the net."""
         spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
-        aimed = aim(start, target, self.ball, seconds, self.passes[number].bounces, spin, fastest=self.fastest(number))
+        aimed = aim(start, target, self.ball, seconds=seconds, bounces=self.passes[number].bounces, spin=spin,
+                    fastest=self.fastest(number))
         clear = self.clear(ways_of(start, aimed.velocity, spin, seconds, self.ball))
         return aimed, aimed.possible & (aimed.miss <= ON_TARGET) & clear
 

@@ -29,7 +29,7 @@ NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
 """Frames by which a flight may be longer or shorter than was best, where places have moved."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Flown:
     """The flights of K strikes. serve: the ball's launch before the first. places, normals (K, 3): the ball's at each
     strike, m, and the way from part to ball. arriving (K, 3), leaving (K-1, 3) m/s and spin (K-1, 3) rad/s of the
@@ -56,13 +56,14 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
     serving = 0.0 if court.scene.serve == GROUND else min(first, LONGEST_SERVE)  # it sets out as the scene begins
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
-        _, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)
+        _, arriving = _arriving(court, chain, places, begun=(first, serving), leaving=leaving, spin=spin)
         places, _ = _laid(court, chain, unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving))
         chain = _within_reach(court, chain, places, missed)
     leaving, spin, missed = _between(court, chain, places, last=True)
-    serve, arriving = _arriving(court, chain, places, (first, serving), leaving, spin)
+    serve, arriving = _arriving(court, chain, places, begun=(first, serving), leaving=leaving, spin=spin)
     normals = unit_vectors(np.concatenate([leaving, np.zeros((1, 3))]) - arriving)
-    return chain, Flown(serve, places, normals, arriving, leaving, spin, missed)
+    return chain, Flown(serve=serve, places=places, normals=normals, arriving=arriving, leaving=leaving, spin=spin,
+                        missed=missed)
 
 
 def _laid(court: Court, chain: Sequence[Link], normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -80,7 +81,8 @@ def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarra
     for count in np.unique(bounces):
         same = np.flatnonzero(bounces == count)
         near = np.array([chain[number].velocity for number in same])
-        aimed = aim(places[same], targets[same], court.ball, seconds[same], int(count), spin[same], near=near)
+        aimed = aim(places[same], targets[same], court.ball, seconds=seconds[same], bounces=int(count), spin=spin[same],
+                    near=near)
         other = (np.linalg.norm(aimed.velocity - near, axis=1) > LEAP) & (not last)
         velocities[same] = np.where(other[:, None], near, aimed.velocity)
         missed[same] = np.where(other, np.inf, aimed.miss)

@@ -93,7 +93,7 @@ def _longer(court: Court, chain: list[Link], which: Iterable[int], lack: float, 
     return chain
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Strike:
     """One strike as it is played. order: what the body has to do. velocity_in, velocity_out (3,) m/s of the ball; spin
     (3,) rad/s with which it leaves.
@@ -111,7 +111,7 @@ class Strike:
     natural: Natural | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PassPlan:
     """strikes in order of time; flights: to the first strike, from each strike to the next, and from the last on;
     seconds: of the whole scene; fps; warnings."""
@@ -149,15 +149,16 @@ def plan_passes(
     court = Court(scene, list(sites), ball, cancelled or (lambda: False))
     chain = choose(court, lambda share, text: report(0.8 * share, text))
     places, normals = laid(court, chain)
-    orders = [_order(court, chain, number, 0.0, places, normals) for number in range(len(chain))]
+    orders = [_order(court, chain, number, time=0.0, places=places, normals=normals) for number in range(len(chain))]
     first = first_time(court, orders[0], need)
-    chain, hasty = in_time(court, chain, orders, places, first, need)
+    chain, hasty = in_time(court, chain, orders, places=places, first=first, need=need)
     report(0.9, "Flights")
     chain, flown = fitted(court, chain, places, first)
     strikes = _strikes(court, chain, flown, first)
     seconds = float(np.ceil((strikes[-1].order.time + scene.lead_out) * scene.fps - 1e-6) / scene.fps)
     told = (*hasty, *_misses(court, flown), *_ways(court, chain, flown))
-    return PassPlan(strikes, _flights(court, flown.serve, strikes, seconds), seconds, scene.fps, told)
+    return PassPlan(strikes=strikes, flights=_flights(court, flown.serve, strikes, seconds), seconds=seconds,
+                    fps=scene.fps, warnings=told)
 
 
 def _order(court: Court, chain: Sequence[Link], number: int, time: float, places, normals) -> HitOrder:
@@ -178,13 +179,15 @@ def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) ->
     met = (flown.places, flown.normals)
     orders = [_order(court, chain, number, float(time), *met) for number, time in enumerate(times)]
     struck = [
-        Strike(site.player, order, arriving, leaving, spin, "struck", site.asked.bounces, link.seconds, link.natural)
+        Strike(player=site.player, order=order, velocity_in=arriving, velocity_out=leaving, spin=spin, outcome="struck",
+               bounces=site.asked.bounces, travel=link.seconds, natural=link.natural)
         for site, order, arriving, leaving, spin, link in zip(
             court.sites, orders, flown.arriving, flown.leaving, flown.spin, chain
         )
     ]
     limp = _limp(outcome, chain[-1], flown.arriving[-1])
-    last = Strike(court.sites[-1].player, orders[-1], flown.arriving[-1], limp, np.zeros(3), outcome, 0, 0.0, None)
+    last = Strike(player=court.sites[-1].player, order=orders[-1], velocity_in=flown.arriving[-1], velocity_out=limp,
+                  spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
     return (*struck, last)
 
 

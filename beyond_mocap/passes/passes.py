@@ -61,7 +61,7 @@ class PlayerPasses:
     moved: np.ndarray
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Passes:
     """A passing scene as it is played. plan: strikes and flights; ball: its path, kind the ball; players in the scene's
     order; warnings: what could not be kept."""
@@ -98,11 +98,13 @@ def passes(
     for number, player in enumerate(scene.players):
         if stop():
             raise Cancelled("cancelled")
-        players.append(_played(library, scene, plan, path, player, _part_of(report, number, scene.players), stop))
+        players.append(_played(library, scene, plan, path=path, player=player,
+                               progress=_part_of(report, number, scene.players), cancelled=stop))
     told = [f"{player.name}: {line}" for player, motion in zip(scene.players, players) for line in motion.warnings]
     moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
     report(1.0, "Done")
-    return Passes(scene, ball_of(scene), plan, path, moved, (*plan.warnings, *_taken(library, plan), *told))
+    return Passes(scene=scene, kind=ball_of(scene), plan=plan, ball=path, players=moved,
+                  warnings=(*plan.warnings, *_taken(library, plan), *told))
 
 
 def _taken(library: Library, plan: PassPlan) -> list[str]:
@@ -136,7 +138,8 @@ def planned(
     scene = _with_chance(scene)
     ball = ball_of(scene)
     sizes = {player.name: size_of(player, library) for player in scene.players}
-    return plan_passes(scene, _sites(library, scene, sizes), ball, _needs(library, sizes), cancelled, progress)
+    return plan_passes(scene, _sites(library, scene, sizes), ball, need=_needs(library, sizes), cancelled=cancelled,
+                       progress=progress)
 
 
 def ball_of(scene: PassScene) -> Ball:
@@ -230,10 +233,11 @@ class _Reach:
         kind = "receive" if one is None else one.kind
         try:
             size, example = self.sizes[name], one.example if one else None
-            moments = self._reached(part, side, tool and tool.for_body(size), size, kind, example)
+            moments = self._reached(part, side, tool and tool.for_body(size), size=size, kind=kind, example=example)
         except InputError as error:
             raise InputError(f"pass {number}, {name}", str(error)) from None
-        return Site(name, place, self.scene.facing(name), kind, part, tool, size, moments, one)
+        return Site(player=name, place=place, facing=self.scene.facing(name), kind=kind, part=part, tool=tool,
+                    size=size, moments=moments, asked=one)
 
     def _reached(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
         key = (part, side, tool, size, kind, example)
@@ -303,10 +307,9 @@ def _played(
     stance = _sized(Stance(player.place, scene.facing(player.name)), size)
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
     settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
-    moved = player_motion(
-        library, stance, orders, ball, ball_of(scene).radius / size, len(path.times), scene.fps, settings, progress,
-        cancelled,
-    )  # fmt: skip
+    moved = player_motion(library, stance, orders, ball=ball, ball_radius=ball_of(scene).radius / size,
+                          frames=len(path.times), fps=scene.fps, settings=settings, progress=progress,
+                          cancelled=cancelled)  # fmt: skip
     if size == 1.0:
         return moved
     grown = in_own_size(moved.take, size, _grown_plan(moved.take.plan, size, player.height))

@@ -20,7 +20,7 @@ MOST_FRAMES = 7
 _BACK_ON_LIMB = 0.2  # of a normal's length that may point up the limb, where the shin or the forearm is
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class StrikeMoments:
     """N moments, in the body's own frame of each (`contact`), for a body `size` times as large as the library's.
 
@@ -84,14 +84,13 @@ def strike_moments(
     if not hits:
         nothing = np.zeros(0)
         empty = StruckFrom(np.zeros((0, 3)), np.zeros((0, 3)), 0.0, np.zeros((0, 3)))
-        return StrikeMoments((), nothing.astype(int), nothing, empty, nothing, nothing, nothing)
+        return StrikeMoments(hits=(), which=nothing.astype(int), frame=nothing, struck=empty, lead=nothing,
+                             trail=nothing, travel=nothing)
     joined = (np.concatenate([getattr(one, name) for one in struck]) * size for name in ("start", "end", "velocity"))
     start, end, velocity = joined
-    return StrikeMoments(
-        tuple(hits), np.concatenate(which), np.concatenate(frames),
-        StruckFrom(start, end, struck[0].radius * size, velocity), np.concatenate(lead), np.concatenate(trail),
-        np.concatenate(travel),
-    )
+    return StrikeMoments(hits=tuple(hits), which=np.concatenate(which), frame=np.concatenate(frames),
+                         struck=StruckFrom(start, end, struck[0].radius * size, velocity), lead=np.concatenate(lead),
+                         trail=np.concatenate(trail), travel=np.concatenate(travel))
 
 
 def launched_from(moments: StrikeMoments, place: np.ndarray, facing: np.ndarray, radius: float):

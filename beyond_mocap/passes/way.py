@@ -41,7 +41,7 @@ _ROOM = 1.25  # times what he needs, from which on he stands between two hits
 _SHARE = 0.7  # of the time between two hits that run-out and run-up may take
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Placed:
     """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at the strike its root
     is at the ordered place; one second of the scene is one of the clip. first, last: frames of the clip, in its own
@@ -62,7 +62,8 @@ class Placed:
         places, _ = pose_kinematics(motion.skeleton, root, local)
         heading = heading_from_positions(motion.skeleton, places)[0]
         turn = float(quaternion.wrapped(order.facing - heading))
-        return cls(library, order, turn, root[0, :2], float(order.hit.first), float(order.hit.last))
+        return cls(library=library, order=order, turn=turn, own_place=root[0, :2], first=float(order.hit.first),
+                   last=float(order.hit.last))
 
     def with_leads(self, into: float, out: float) -> Placed:
         """The same with so many seconds of run-up and run-out."""

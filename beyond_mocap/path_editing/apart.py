@@ -151,7 +151,8 @@ class _Search:
             rows = np.repeat(np.arange(1, len(new) + 1), [len(self.may_meet[who][other]) for other in new])
             steps = np.concatenate([self.may_meet[who][other] for other in new])
             tracks = np.stack([self.track(body, changes[body]) for body in (who, *new)])
-            hits = collisions_at(0, rows, steps, self.clock, tracks, self.wanted, self.limits.height)
+            hits = collisions_at(0, rows, steps, times=self.clock, places=tracks, distance=self.wanted,
+                                 height=self.limits.height)
             for row, other in enumerate(new, start=1):
                 pair = {"first": min(who, other), "second": max(who, other)}
                 known[other, changes[other]] = [replace(hit, **pair) for hit in hits if hit.second == row]

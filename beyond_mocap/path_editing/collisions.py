@@ -19,7 +19,7 @@ DISTANCE = 0.6
 _JUMP = 15.0  # m/s: nobody runs like that; such a step is a motion that starts again somewhere else
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Collision:
     """Two bodies nearer than the distance asked for, without a break.
 
@@ -43,7 +43,8 @@ def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE
     """
     found = []
     for first in range(len(places) - 1):
-        found += collisions_of(first, range(first + 1, len(places)), times, places, distance, height)
+        found += collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
+                               height=height)
     return sorted(found, key=lambda collision: (collision.start, collision.first, collision.second))
 
 
@@ -53,7 +54,7 @@ def collisions_of(one: int, others, times, places, distance: float = DISTANCE, h
     if len(times) < 2 or not len(others):
         return []
     rows, steps = np.indices((len(others), len(times) - 1)).reshape(2, -1)
-    return collisions_at(one, others[rows], steps, times, places, distance, height)
+    return collisions_at(one, others[rows], steps, times=times, places=places, distance=distance, height=height)
 
 
 def collisions_at(one: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
@@ -70,7 +71,8 @@ def collisions_at(one: int, others, steps, times, places, distance: float = DIST
     for other in np.unique(others[hit]):
         of = hit & (others == other)
         pair = [min(one, other), max(one, other)]
-        found += _joined(pair, steps[of], enter[of], leave[of], nearest[of], gap[of], times, places)
+        found += _joined(pair, steps[of], enter[of], leave=leave[of], nearest=nearest[of], gap=gap[of], times=times,
+                         places=places)
     return found
 
 
@@ -91,8 +93,8 @@ def _joined(pair, steps, enter, leave, nearest, gap, times, places):
         step, share = steps[best], nearest[best]
         both = places[pair, step] * (1 - share) + places[pair, step + 1] * share
         when = times[step] + share * (times[step + 1] - times[step])
-        found.append(Collision(int(pair[0]), int(pair[1]), float(span[0]), float(span[1]), float(when),
-                               float(gap[best]), tuple(map(float, both.mean(axis=0)))))
+        found.append(Collision(first=int(pair[0]), second=int(pair[1]), start=float(span[0]), end=float(span[1]),
+                               time=float(when), gap=float(gap[best]), place=tuple(map(float, both.mean(axis=0)))))
     return found
 
 

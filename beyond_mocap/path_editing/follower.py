@@ -25,7 +25,7 @@ class Change:
     detours: tuple[tuple[float, float, float], ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Follower:
     """One body without any change.
 

@@ -135,7 +135,7 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
     a, b = (height[at] + np.sum(slope[at] * (toe - mean[at, 1]), axis=1) for at in (before, after))
     found = a + (b - a) * share
     tilt = slope[before] + (slope[after] - slope[before]) * share[:, None]
-    return found, tilt, _clearing(feet, found, tilt, clear, way, before, surface)
+    return found, tilt, _clearing(feet, found, tilt, clear=clear, way=way, which=before, surface=surface)
 
 
 def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:

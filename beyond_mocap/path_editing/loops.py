@@ -36,7 +36,7 @@ _JOINTS = 16  # compared at most, of a body that is not a human one
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Loop:
     """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
 
@@ -75,7 +75,9 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     tried = _rough(features, residuals, free, least, stride)
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
     feet = _feet(residuals.skeleton, features)
-    found = [_exact(features, residuals, pair, free, least, stride, usual, feet) for pair in tried]
+    found = [_exact(
+        features, residuals, pair, free=free, least=least, stride=stride, usual=usual, feet=feet,
+    ) for pair in tried]
     found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
@@ -251,7 +253,8 @@ def _exact(
     off = float(apart[at])
     ending = float(np.linalg.norm(features[first:last] - features[-1], axis=1).min())
     usual = max(usual, 1e-9)
-    return Loop(first, last, off, off / usual, float(cost[at]), metres, (last - first) / stride, ending / usual)
+    return Loop(start=first, end=last, apart=off, unlike=off / usual, cost=float(cost[at]), metres=metres,
+                strides=(last - first) / stride, ending=ending / usual)
 
 
 def _soles_apart(

@@ -83,7 +83,8 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
     weights = 1.0 + _ENDS * (np.exp(-after / _ENDS_SECONDS) + np.exp(-left / _ENDS_SECONDS))
     pieces, rest, coefficients = spline_pieces(times[-1] - times[0], seconds), places, 0.0
     for _ in range(_PASSES):
-        knots, more = smoothing_spline(rest, times, pieces, seconds, min(_ORDER, len(places)), weights)
+        knots, more = smoothing_spline(rest, times, pieces, stiff=seconds, order=min(_ORDER, len(places)),
+                                       weights=weights)
         coefficients = coefficients + more
         path = SplinePath(knots, coefficients)
         rest = places - path.at(times)

@@ -29,7 +29,7 @@ _STILL = 0.01  # m/s: a path passed slower has no heading
 _COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Residuals:
     """T frames of a motion in the moving frame of its own path.
 

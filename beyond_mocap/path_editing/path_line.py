@@ -48,7 +48,7 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
         )
     else:
         weights = np.ones(len(along))
-        spline = smoothing_spline(sampled, along, pieces, rounding, _ORDER, weights, ends_met=True)
+        spline = smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, ends_met=True)
     return SplinePath(*spline, closed=closed)
 
 

@@ -132,8 +132,8 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
     return {
         "skate": skate,
         "ground_mm": {
-            **_ground("", mine, stood, ridden.origin, source.motion, ground),
-            **_ground("source_", own, own_stood, way, source.motion, None),
+            **_ground("", mine, stood, origin=ridden.origin, recording=source.motion, ground=ground),
+            **_ground("source_", own, own_stood, origin=way, recording=source.motion, ground=None),
         },
         "foot_correction_m": _spread(correction) if len(correction) else None,
         "ik_miss_share": float(np.mean(ridden.miss.max(axis=1) > MISSED)),

@@ -67,7 +67,7 @@ STILL = 0.05
 """Metres of path below which a motion stands still."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RideSettings:
     """What a user chooses; the settings table says what each means.
     detours: (arc m, width m, offset m to the left) each."""
@@ -99,7 +99,7 @@ class RideSettings:
             raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RideSource:
     """A motion relative to its own path: all that does not depend on the new one.
 
@@ -137,7 +137,7 @@ class RideSource:
         return curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Ridden:
     """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
     carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,):
@@ -201,16 +201,18 @@ def prepare(
     place, turned = relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
     rotations = motion.rotations.copy()
     rotations[:, 0] = turned
-    under, up = _own_ground(motion, standing, path, arc, moving, metres) if humanoid else _flat(len(motion))
+    under, up = _own_ground(
+        motion, standing, path, arc=arc, moving=moving, metres=metres,
+    ) if humanoid else _flat(len(motion))
     residuals = Residuals(
         place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]), standing=np.asarray(standing, bool),
         frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
         under=under, up=up, fps=motion.fps, skeleton=motion.skeleton,
     )  # fmt: skip
     sole = contacts.recorded_floor(motion)[1] if humanoid else 0.0
-    return RideSource(
-        motion, residuals.standing, path, arc, moving, residuals, settings.frame, humanoid, still, sole, told
-    )
+    return RideSource(motion=motion, standing=residuals.standing, path=path, arc=arc, moving=moving,
+                      residuals=residuals, frame=settings.frame, humanoid=humanoid, still=still, sole=sole,
+                      warnings=told)
 
 
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
@@ -225,20 +227,21 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)
     rows = shown(residuals, timing.at)
-    at = _parameters(source, path, arc, timing, rows, settings)
+    at = _parameters(source, path, arc, timing=timing, rows=rows, settings=settings)
     origin, tangent = path.at(at), path.at(at, 1)
     own = _faces(source.motion, source.humanoid) if source.still and path is source.path else None
     moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
     root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
     laid = root, rotations
     if settings.lean and source.humanoid:
-        rotations = _leaned(source, rows, moving, timing, rotations, seams)
+        rotations = _leaned(source, rows, moving, timing=timing, rotations=rotations, seams=seams)
     correction, miss = np.zeros((len(root), 2)), np.zeros((len(root), 2))
     if settings.plant and source.humanoid:
-        free, strained = _strained(source, path, at, tangent, timing, rows)
-        under = _ground(path, arc, settings, ground, moving, timing, rows)
+        free, strained = _strained(source, path, at, tangent=tangent, timing=timing, rows=rows)
+        under = _ground(path, arc, settings, terrain=ground, moving=moving, timing=timing, rows=rows)
         steps, more = _steps(source, rows, moving, timing, free)
-        held = follow(residuals.skeleton, root, rotations, rows.standing, residuals.fps, under, source.sole, steps)
+        held = follow(residuals.skeleton, root, rotations, standing=rows.standing, fps=residuals.fps, ground=under,
+                      sole=source.sole, steps=steps)
         if free.any():
             held = _let_go(held, root, rotations, free, residuals.fps)
             rows = rows.changed(standing=rows.standing & ~free[:, None, None])
@@ -246,10 +249,9 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
         end = replace(end, told=(*end.told, *more))
         root, rotations, correction, miss = held.root, held.rotations, held.correction, held.miss
     motion = Motion(residuals.skeleton, root, rotations, residuals.fps)
-    ridden = Ridden(
-        motion, rows.frames, rows.standing, timing.arc, origin, moving.heading, seams, correction, miss, laid, source,
-        (*source.warnings, *end.told), end.again,
-    )  # fmt: skip
+    ridden = Ridden(motion=motion, frames=rows.frames, standing=rows.standing, arc=timing.arc, origin=origin,
+                    heading=moving.heading, seams=seams, correction=correction, miss=miss, laid=laid, source=source,
+                    warnings=(*source.warnings, *end.told), again=end.again)  # fmt: skip
     return _begun_again(ridden, end) if len(end.again) else ridden
 
 
@@ -274,7 +276,8 @@ def _timed(
         told += ("the motion stands still: it is placed at the path's beginning",)
     if way is not None:
         own = _own_way(source, residuals)
-        timing = by_way(residuals, own, way, wishes, settings.speed, settings.delay, path.closed)
+        timing = by_way(residuals, own, way, wishes=wishes, speed=settings.speed, delay=settings.delay,
+                        closed=path.closed)
     elif settings.by_arc_length or source.still:
         timing = by_arc_length(residuals, settings.speed, settings.delay)
     else:
@@ -324,9 +327,8 @@ def _leaned(
     since = np.diff(timing.arc, prepend=timing.arc[:1])
     own_slope = _own_slope(source, rows)
     own_speed = np.column_stack([rows.step * np.cos(own_slope) * fps, np.zeros(len(rows))])
-    lean = missing_lean(
-        since * np.cos(moving.slope) * fps, moving.heading, own_speed, rows.turn, seams, fps, LEANS_FROM
-    )
+    lean = missing_lean(since * np.cos(moving.slope) * fps, moving.heading, own_speed, turn=rows.turn, seams=seams,
+                        fps=fps, slow=LEANS_FROM)
     if np.abs(lean).max(initial=0.0) > 1e-9:
         rotations = banked(rows.skeleton, rotations, moving.heading, lean)
     steeper = zero_phase_hann((moving.slope - own_slope)[:, None], fps, SLOPE_SECONDS)[:, 0]

@@ -30,7 +30,7 @@ class Shares:
     sd: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Finding:
     """Whether `new` looks more natural than `old`.
 
@@ -65,7 +65,7 @@ class Finding:
         return bool(self.holm_p < ALPHA)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Analysis:
     """All that is found: by_system and by_scenario (title and its rows) of ratings, empty in a study of pairs;
     findings; notes: what to know of the raters."""
@@ -92,8 +92,9 @@ def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] =
     findings = [find(study, answers, new, old) for new, old in hypotheses]
     raised = holm([finding.p for finding in findings])
     findings = [Finding(**{**vars(finding), "holm_p": p}) for finding, p in zip(findings, raised)]
-    return Analysis(study, answers, _by_system(study, answers), _by_scenario(study, answers), tuple(findings),
-                    tuple(_notes(study, answers)))  # fmt: skip
+    return Analysis(study=study, answers=answers, by_system=_by_system(study, answers),
+                    by_scenario=_by_scenario(study, answers), findings=tuple(findings),
+                    notes=tuple(_notes(study, answers)))  # fmt: skip
 
 
 def holm(p: Sequence[float]) -> list[float]:
@@ -169,10 +170,10 @@ def _finding(new: str, old: str, off: np.ndarray, pooled: float, delta: float) -
     varies = count > 1 and np.ptp(off) > 1e-12
     tests = judged(-off)  # of what is to be smaller
     half = float(student.ppf(0.975, count - 1)) * sd / np.sqrt(count) if varies else np.nan
-    return Finding(
-        new, old, off, mean, mean - half, mean + half, mean / (sd / np.sqrt(count)) if varies else np.nan,
-        max(count - 1, 0), tests.t_p, tests.wilcoxon_p, tests.normal, pooled, mean / sd if varies else np.nan, delta,
-    )  # fmt: skip
+    return Finding(new=new, old=old, differences=off, mean=mean, low=mean - half, high=mean + half,
+                   t=mean / (sd / np.sqrt(count)) if varies else np.nan, degrees=max(count - 1, 0), p=tests.t_p,
+                   wilcoxon_p=tests.wilcoxon_p, normal_p=tests.normal, pooled_p=pooled,
+                   d=mean / sd if varies else np.nan, delta=delta)  # fmt: skip
 
 
 def _shares(name: str, values: list[int]) -> Shares:

@@ -45,7 +45,7 @@ def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
         for place, mark, rater, question, answer in _rows(path):
             if not answer:
                 continue
-            answer = _checked(study, place, mark, rater, question, answer)
+            answer = _checked(study, place, mark, rater=rater, question=question, answer=answer)
             before = found.setdefault(rater, {}).setdefault(question, (answer, place))
             if before[0] != answer:
                 told = f"{rater} says {answer} to {question} here and {before[0]} in {before[1]}"

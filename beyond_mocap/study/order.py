@@ -34,7 +34,7 @@ class Clip:
     name: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """A study. id: eight letters that its answers carry. systems, scenarios: in the order of the table. pairs: whether
     two clips of one scenario are compared instead of each being rated. orders: rater -> what he sees, one after the
@@ -91,7 +91,7 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
             raise InputError("raters", str(raters), "no more than there are orders", "add clips or ask fewer raters")
         taken.add(order)
         orders[f"R{number + 1:02d}"] = order
-    return Study(mark, seed, pairs, named, orders)
+    return Study(id=mark, seed=seed, pairs=pairs, clips=named, orders=orders)
 
 
 def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:

@@ -53,7 +53,7 @@ def read_study(folder: Path) -> Study:
             raise ValueError("another version")
         if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
             raise ValueError(f"{odd!r} is no name")
-        return Study(str(told["study"]), int(told["seed"]), told["pairs"], clips, orders)
+        return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
         found = f"not of the form of a study ({type(error).__name__}: {error})"
         raise InputError(path, found, "what 'study order' writes", "make the study again") from None

@@ -186,10 +186,9 @@ def with_course(take: Take, plan: ResolvedPlan) -> Take:
         for span in plan.timeline.spans if _CARRYING.intersection(span.words)
     ]  # fmt: skip
     standing = take.contacts if take.stepped is None else take.contacts | take.stepped
-    done = dribble(
-        take.motion.skeleton, take.motion.root_positions, take.motion.rotations, standing, path, stretches, held, fps,
-        measured=take.ball.measured & ~filled, turns=turns,
-    )
+    done = dribble(take.motion.skeleton, take.motion.root_positions, take.motion.rotations, standing=standing,
+                   ball=path, stretches=stretches, held=held, fps=fps, measured=take.ball.measured & ~filled,
+                   turns=turns)
     pushes = tuple(DribbleTouch(push.first, push.last, push.side) for push in done.pushes)
     ball = replace(take.ball, positions=done.ball)
     return replace(take, ball=ball, solved=plan.course, met_ball=take.ball, dribbled=pushes)

@@ -17,7 +17,7 @@ PROVENANCE_COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Provenance:
     """Where each of T output frames came from: times (T,) s; clip, T paths as below the library; clip_frame (T,)
     fractional, in the clip's own rate; mirrored (T,) bool; words, T tuples; contacts (T, 2) bool, left and right foot

@@ -264,7 +264,7 @@ class _Update:
         at, share = slice(made.start + low, made.stop + low), construction.old.share[made]
         new, old = (planted.root[made], planted.rotations[made]), (self.root[at], self.rotations[at])
         self.root[at], self.rotations[at] = handed_over(
-            self.library.skeleton, new, old, share, taken.standing[made], self.plan.fps
+            self.library.skeleton, new, old, share=share, standing=taken.standing[made], fps=self.plan.fps
         )
         self.ball[at] = _ball_between(ball[made], self.ball[at], share)
         self.contacts[at], self.stepped[at] = taken.contacts[made], taken.stepped[made]

@@ -14,7 +14,7 @@ from .plan import Pin, Plan, SolvedCourse
 from .search.edit_list import EditList
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class KeyResult:
     """How one key moment was served.
 
@@ -55,7 +55,7 @@ class DribbleTouch:
     side: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Take:
     """A synthesized player.
 

@@ -24,7 +24,7 @@ _PAD, _RUNNERS_PAD, _RUNS = 2.5, 1.9, 2.0
 _PLAN_RATE = 120.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class GaitStyle:
     """What makes one walker differ from another, all relative to the published figures.
 
@@ -48,7 +48,7 @@ class GaitStyle:
     life: float = 1.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Course:
     """A way planned over N moments, `pad` of them before the first and after the last frame that is asked for.
 
@@ -98,7 +98,8 @@ def plan(
     frequency = stride_frequency(gear, direction, turn_rate * root_scale) / root_scale * style.cadence
     frequency = frequency * (1.0 + 0.015 * style.life * wander(times, seed, 3.1))
     strides = phase + _integral(frequency, rate, pad)
-    return Course(times, speed, gear, direction, heading, path, acceleration, strides, pad, stride)
+    return Course(times=times, speed=speed, gear=gear, direction=direction, heading=heading, path=path,
+                  acceleration=acceleration, phase=strides, pad=pad, stride=stride)
 
 
 def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ _TOE_LIFTS = np.radians(42.0)
 _FULL_STEP = 0.55
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Footsteps:
     """The K stances of one foot in order of time.
 
@@ -129,7 +129,8 @@ def travel(
     air = times > steps.off[which]
     if not np.any(air):
         return standing
-    flying = _swing(steps, which[air], times, air, hip, heading, neutral, thigh_shank)
+    flying = _swing(steps, which[air], times, air=air, hip=hip, heading=heading, neutral=neutral,
+                    thigh_shank=thigh_shank)
     out = {}
     for name in ("ankle", "pitch", "yaw", "bend"):
         out[name] = getattr(standing, name).copy()
@@ -163,9 +164,8 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
     free_land = (at_land - free(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
     wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
     wanted_land = np.concatenate([land.ankle, land.pitch[:, None]], axis=-1)
-    full = now + _bridge(
-        share, length, wanted_leave - at_leave, wanted_land - at_land, leave_speed - free_leave, land_speed - free_land
-    )
+    full = now + _bridge(share, length, wanted_leave - at_leave, offset1=wanted_land - at_land,
+                         speed0=leave_speed - free_leave, speed1=land_speed - free_land)
     size = steps.step_size(scale)[which]
     small = _small_step(share, wanted_leave, wanted_land, size * 0.05 * scale)
     mixed = full * size[:, None] + small * (1.0 - size[:, None])

@@ -100,7 +100,7 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
     place = place - _lean_shift(course, neutral, middle)
     toe_out = sign * (np.radians(at_speed("toe_out", gear)) + style.toe_out)
     on, off = _within_reach(course, place, on, off, neutral.leg)
-    return Footsteps(side, on, off, place, heading + toe_out, gear, direction)
+    return Footsteps(side=side, on=on, off=off, place=place, yaw=heading + toe_out, speed=gear, direction=direction)
 
 
 def _within_reach(
@@ -165,7 +165,8 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...],
     hips[:, 2] -= _drop(posture, times, steps, neutral)
     posture = posture.changed(hips=hips)
     tops = hip_joints(posture, neutral)
-    paths = [travel(steps[s], times, tops[:, s], posture.heading, neutral, thigh_shank(neutral, s)) for s in (0, 1)]
+    paths = [travel(steps[s], times, tops[:, s], heading=posture.heading, neutral=neutral,
+                    thigh_shank=thigh_shank(neutral, s)) for s in (0, 1)]
     ankles = [kept_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(thigh_shank(neutral, s))) for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
     return posture.changed(
@@ -202,7 +203,8 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
     tops = hip_joints(posture, neutral)
     need = np.zeros(len(times))
     for side in (0, 1):
-        path = travel(steps[side], times, tops[:, side], posture.heading, neutral, thigh_shank(neutral, side))
+        path = travel(steps[side], times, tops[:, side], heading=posture.heading, neutral=neutral,
+                      thigh_shank=thigh_shank(neutral, side))
         longest = _straightest(steps[side], times) * sum(thigh_shank(neutral, side))
         flat = np.sum((tops[:, side, :2] - path.ankle[:, :2]) ** 2, axis=-1)
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))

@@ -41,7 +41,7 @@ class Gesture:
     end: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Strike:
     """How the right foot meets the ball and what the body does meanwhile; seconds from the touch, metres, degrees.
 
@@ -156,7 +156,7 @@ def strike(
     course = _in_step(course, key, recipe)
     steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
     posture = posture_over(course, steps, neutral, style, seed)
-    posture = _laid_over(posture, course, steps, key, recipe, neutral)
+    posture = _laid_over(posture, course, steps, key=key, recipe=recipe, neutral=neutral)
     begin, land = _swing_around(steps[RIGHT], key)
     return Gesture(to_motion(posture.frames(course.asked), neutral), key, begin - 0.15, land + 0.1)
 
@@ -209,7 +209,7 @@ def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Stri
     for side, rows in ((LEFT, recipe.left_arm), (RIGHT, recipe.right_arm)):
         arms[:, side, :4] = mixed(arms[:, side, :4], np.radians(keyed(rows, times)), fling)
     posture = posture.changed(pelvis=pelvis, spine=spine, head=head, arms=arms)
-    return _kicking_foot(posture, course, steps[RIGHT], key, recipe.foot, neutral)
+    return _kicking_foot(posture, course, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
 
 
 def _kicking_foot(

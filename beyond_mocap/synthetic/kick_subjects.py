@@ -15,7 +15,7 @@ _WHIP = 0.05  # s around the contact in which the leg goes through the ball
 _LEAST = 8.0  # m/s of the ball, the slowest kick that is swung at all
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class KickManner:
     """How somebody kicks: approach, degrees that the way up is turned more than usual; factors on stride, back (how far
     leg and pelvis are swung back) and follow (how high the leg goes after the ball); lean, degrees that the trunk is

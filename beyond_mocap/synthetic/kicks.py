@@ -36,7 +36,7 @@ _TOES_UP = 0.35  # radians that the toes are bent up at the contact
 _FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s, between which the leg leaves the ground, comes back to it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class KickStyle:
     """How a right foot kicks towards +X; seconds from the contact, degrees, metres of an adult.
 
@@ -150,7 +150,7 @@ def kicked(
     foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
     it. loft: degrees by which its toes point less down there. fps: frames per second.
     """
-    plan = _planned(style, neutral, foot, lift, loft, -BEFORE, AFTER)
+    plan = _planned(style, neutral, foot, lift=lift, loft=loft, first=-BEFORE, last=AFTER)
     seconds = np.arange(int(np.floor((len(plan) - 1) / _PLAN / rate * fps + 1e-6)) + 1) / fps
     root, rotations = at_frames(plan, seconds * rate * _PLAN)
     return place(Motion(plan.skeleton, root, rotations, fps), turn)
@@ -165,7 +165,9 @@ def contact(
     times = np.arange(count + 1) / _PLAN - _NEAR
     before, curve = _upright(style, neutral, times)
     around = slice(count // 2 - 1, count // 2 + 2)
-    each = [_swung(before, style, times, neutral, curve, lift, loft).frames(around) for lift, loft in ways]
+    each = [_swung(
+        before, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft,
+    ).frames(around) for lift, loft in ways]
     motion = to_motion(Posture.joined(each), neutral)
     motion = mirror(motion) if foot == "left" else motion
     limb = getattr(identify(motion.skeleton), foot)
@@ -178,7 +180,7 @@ def _planned(style, neutral: Neutral, foot: str, lift: float, loft: float, first
     """The kick between two seconds, finely."""
     times = np.arange(int(round((last - first) * _PLAN)) + 1) / _PLAN + first
     posture, curve = _upright(style, neutral, times)
-    motion = to_motion(_swung(posture, style, times, neutral, curve, lift, loft), neutral)
+    motion = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
     return mirror(motion) if foot == "left" else motion
 
 
@@ -260,13 +262,13 @@ def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple
     yaw = -style.approach
     one, two, three = _STEPS
     left = (
-        *_step(one, falls["left0"], falls["left1"], 0.10, yaw, yaw),
-        *_step(three, falls["left1"], falls["planted"], 0.13, yaw, -10.0),
-        *_step((0.39, 0.82), falls["planted"], falls["left2"], 0.10, -10.0, 0.0),
+        *_step(one, falls["left0"], falls["left1"], high=0.10, yaw=yaw, later=yaw),
+        *_step(three, falls["left1"], falls["planted"], high=0.13, yaw=yaw, later=-10.0),
+        *_step((0.39, 0.82), falls["planted"], falls["left2"], high=0.10, yaw=-10.0, later=0.0),
     )
     right = (
-        *_step(two, falls["right0"], falls["right1"], 0.12, yaw, yaw - 4.0),
-        *_step((-0.27, _DOWN[1]), falls["right1"], falls["right2"], 0.12, yaw - 4.0, -6.0),
+        *_step(two, falls["right0"], falls["right1"], high=0.12, yaw=yaw, later=yaw - 4.0),
+        *_step((-0.27, _DOWN[1]), falls["right1"], falls["right2"], high=0.12, yaw=yaw - 4.0, later=-6.0),
     )
     return left, right
 

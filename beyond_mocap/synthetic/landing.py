@@ -45,7 +45,7 @@ _RISEN = 0.04  # m of the hips above where they lay, from which a way up begins
 _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a marker taken for another, near the end
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Landed:
     """motion: the recording, frame by frame as it was, and what follows. recorded, touched, rising: number of recorded
     frames that are kept (all, but for a few behind a jump of its markers just before its end), the frame at which the
@@ -96,7 +96,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     goal = at_frames(turned, shown)
     over = track.towards(goal[1], np.arange(1, len(shown) + 1) / fps, _RATES[2])
     rotations = np.concatenate([poses[: touched + 1], down, over])
-    root = _root(motion, centre, rotations, touched + 1, len(down), turned, shown)
+    root = _root(motion, centre, rotations, flight=touched + 1, settling=len(down), up=turned, shown=shown)
     rotations = arms_above_ground(skeleton, root, rotations, fps)
     root[:, 2] += widened(np.maximum(lowest_root(skeleton, rotations) - root[:, 2], 0.0), fps)
     out = Motion(
@@ -107,7 +107,8 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     own = ways_up[way]
     begun = _begin(own)
     frames = begun + shown[wait:] * (_HASTE * own.fps / fps)
-    return Landed(out, len(motion), first, start, way, np.clip(frames, 0, len(own) - 1))
+    return Landed(motion=out, recorded=len(motion), touched=first, rising=start, way=way,
+                  way_frames=np.clip(frames, 0, len(own) - 1))
 
 
 @dataclass(frozen=True, eq=False)

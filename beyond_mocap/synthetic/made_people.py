@@ -26,7 +26,7 @@ class Person:
 
 def adult(fastest: float, manner) -> Person:
     """The project's own adult, in the manner of the tables."""
-    return Person("adult", STATURE, adult_skeleton(), "right", fastest, manner)
+    return Person("adult", STATURE, adult_skeleton(), side="right", fastest=fastest, manner=manner)
 
 
 def person(
@@ -38,7 +38,7 @@ def person(
     stature = float(chance.uniform(1.60, 2.00))
     own = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
     hardest = float(chance.uniform(*fastest))
-    return Person(name, stature, body_of(stature, chance), "right", hardest, own)
+    return Person(name, stature, body_of(stature, chance), side="right", fastest=hardest, manner=own)
 
 
 def body_of(stature: float, chance: np.random.Generator) -> Skeleton:

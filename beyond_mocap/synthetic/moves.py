@@ -70,7 +70,8 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
     hips[:, 2] = rise
     for side in (LEFT, RIGHT):
         ankles[:, side], feet[:, side, 1], toes[:, side] = _jumping_foot(
-            ankles[:, side], feet[:, side, 2], times, air, rise, pitch, tuck * scale, neutral
+            ankles[:, side], feet[:, side, 2], times, air=air, rise=rise, pitch=pitch, tuck=tuck * scale,
+            neutral=neutral,
         )
     pelvis = posture.pelvis + np.stack([0 * times, trunk[:, 0], 0 * times], -1) * ease[:, None]
     spine = posture.spine + np.stack([0 * times, trunk[:, 1], 0 * times], -1) * ease[:, None]
@@ -204,9 +205,8 @@ def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves)
     places = np.array(places + places[-1:])
     count = len(on)
     yaw = np.full(count, sign * np.radians(tables.at_speed("toe_out", 0.3)))
-    return Footsteps(
-        side, on, off, np.stack([places, np.full(count, left)], -1), yaw, np.full(count, 1.2), np.zeros(count)
-    )
+    return Footsteps(side=side, on=on, off=off, place=np.stack([places, np.full(count, left)], -1), yaw=yaw,
+                     speed=np.full(count, 1.2), direction=np.zeros(count))
 
 
 # seconds from the beginning; hips ahead, height; tilt of pelvis, spine, head; ankles ahead (left, right), height; foot

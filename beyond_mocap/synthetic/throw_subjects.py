@@ -19,7 +19,7 @@ _SCATTER = {"slot": 2.0, "stride": 0.04, "lift": 0.08, "wind_up": 0.04, "lean": 
 _LEAST = 9.0  # m/s, the slowest throw that is wound up at all
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Manner:
     """How somebody throws: slot, degrees that the trunk leans away from the arm at release, more than usual; factors on
     stride, lift (of the leading leg), wind_up (seconds before the foot is down), lean (forward, after release), off_arm
@@ -58,7 +58,7 @@ def subject_throws(
     manner = scattered(thrower.manner, _SCATTER, chance)
     effort = float(np.clip((speed - _LEAST) / (thrower.fastest - _LEAST), 0.0, 1.0))
     style = styled(STYLES["overarm"], manner, effort)
-    return throw(target, speed, thrower.side, style, thrower.skeleton, fps)
+    return throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
 
 
 def styled(base: ThrowStyle, manner: Manner, effort: float = 1.0) -> ThrowStyle:

@@ -105,7 +105,7 @@ _SIDEARM = replace(
 STYLES = {"overarm": _OVERARM, "sidearm": _SIDEARM}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Throw:
     """A made throw.
 
@@ -175,7 +175,8 @@ class _Swing:
         motion = place(Motion(self.motion.skeleton, root, rotations, fps), turn)
         spot, velocity = self.released(at)
         turned = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([spot, rate * velocity]))
-        return Throw(motion, (BEFORE + at) / rate, self.arm, turned[0], turned[1], self.grip)
+        return Throw(motion=motion, release=(BEFORE + at) / rate, arm=self.arm, position=turned[0], velocity=turned[1],
+                     grip=self.grip)
 
 
 def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, float, float]:

@@ -31,7 +31,7 @@ _BENT = 0.012  # m by which who is ready stands lower than who stands
 _STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: the most of it, and over which it is neared
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Volley:
     """How a body that stands strikes with its right side; seconds from the touch, metres of an adult, degrees.
 

@@ -57,7 +57,7 @@ class Freedom:
         return cls(0.0, 0.0, 0.02, False)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Corrected:
     """A motion whose ball hits.
 
@@ -104,7 +104,9 @@ def corrected(
     part.chain(motion)
     if not _LEAST <= frame <= len(motion) - 1 - _LEAST:
         raise InputError("release", f"frame {frame:.1f} of {len(motion)}", f"at least {_LEAST} frames before and after")
-    return _Search(motion, part, float(frame), target, ball, freedom, speed, hold).whole()
+    return _Search(
+        motion, part, float(frame), target=target, ball=ball, freedom=freedom, speed=speed, hold=hold,
+    ).whole()
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,7 +212,7 @@ class _Search:
         points, velocities = carried(self.part, motion, sources / (1.0 + change.pace))
         now = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
         cost = self._cost(motion, source / (1.0 + change.pace))
-        rows, cost = self._best(points, velocities, now, start, cost, at_once(points.shape[1]))
+        rows, cost = self._best(points, velocities, now, start=start, cost=cost, follows=at_once(points.shape[1]))
         cost = cost + ((sources - self.asked) / self.given.fps * _LATER) ** 2
         best = int(np.argmin(cost))
         return _Change(rows[best]), float(sources[best])
@@ -225,7 +227,8 @@ class _Search:
         for number in range(_ROUNDS):
             now = limb.shifted(change.row[:6])
             points, velocities = carried(self.part, now, np.array([frame]))
-            found = self._judged(motion, now, frame, source, change, start, points, velocities)
+            found = self._judged(motion, now, frame, source=source, change=change, start=start, points=points,
+                                 velocities=velocities)
             better = best is None or found.missed < best.missed
             slow = best is not None and found.missed > 0.1 * best.missed
             if better:
@@ -281,11 +284,13 @@ class _Search:
             hessian, pull = np.tile(weight, (count, 1, 1)), np.tile(weight @ now.row, (count, 1))
         level = slopes @ now.row - short
         free = [i for i in range(size) if i not in set(fixed) and not (i in (6, 7) and not self.bounds[i - 6])]
-        rows = self._least(hessian, pull, slopes, level, np.tile(now.row, (count, 1)), free)
+        rows = self._least(hessian, pull, slopes, level=level, rows=np.tile(now.row, (count, 1)), free=free)
         over = np.abs(rows[:, 6:8]) > self.bounds + 1e-12
         if over.any() and not len(fixed):
             rows[:, 6:8] = np.clip(rows[:, 6:8], -self.bounds, self.bounds)
-            again = self._least(hessian, pull, slopes, level, rows, [i for i in free if i not in (6, 7)])
+            again = self._least(
+                hessian, pull, slopes, level=level, rows=rows, free=[i for i in free if i not in (6, 7)],
+            )
             rows = np.where(over.any(axis=1)[:, None], again, rows)
         gone = np.einsum("ni,ij,nj->n", rows, weight, rows)
         return rows, gone + worth * (speed + np.einsum("ni,ni->n", faster, rows - now.row) - wish) ** 2
@@ -335,13 +340,12 @@ class _Search:
         rest = (start if self.walks else start + change.rest)[None]
         position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
         none = np.zeros(1)
-        there, _, _ = self._arrives(points, velocities, none, none, rest, np.array([change.seconds]))
+        there, _, _ = self._arrives(points, velocities, none, pace=none, rest=rest, seconds=np.array([change.seconds]))
         end = self.part.chain(now)[2]
         shift = forward_kinematics(now)[0][:, end] - forward_kinematics(before)[0][:, end]
-        return Corrected(
-            now, frame, position[0], velocity[0], spin[0], change.seconds,
-            float(np.linalg.norm(there[0] - self.target)), float(np.linalg.norm(shift, axis=-1).max()), shift,
-            change.turn, 1.0 + change.pace, (source - self.asked) / self.given.fps / (1.0 + change.pace),
-            float(np.linalg.norm(change.rest)) if self.walks else 0.0,
-            float(np.abs(gap).max(initial=0.0)),
-        )  # fmt: skip
+        return Corrected(motion=now, frame=frame, position=position[0], velocity=velocity[0], spin=spin[0],
+                         seconds=change.seconds, miss=float(np.linalg.norm(there[0] - self.target)),
+                         moved=float(np.linalg.norm(shift, axis=-1).max()), shift=shift, turned=change.turn,
+                         pace=1.0 + change.pace, later=(source - self.asked) / self.given.fps / (1.0 + change.pace),
+                         elsewhere=float(np.linalg.norm(change.rest)) if self.walks else 0.0,
+                         gap=float(np.abs(gap).max(initial=0.0)))  # fmt: skip

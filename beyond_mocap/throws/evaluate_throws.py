@@ -38,7 +38,7 @@ _OTHERS = ("far_impact", "own_impact", "head", "head_share", "jerk", "bones", "b
 _WITHIN = 1e-3  # radians beyond a limit that are none
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ThrowFigures:
     """One motion generated anew.
 

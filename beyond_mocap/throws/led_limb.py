@@ -18,7 +18,7 @@ have."""
 _NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m, m/s, by which a limb is tried
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LedLimb:
     """A motion whose limb is led along shifted paths: `window`, the body at the frames of the shifts, and its limb as
     it rests. hold: keeps joints within their limits, None where they have none."""
@@ -35,7 +35,8 @@ class LedLimb:
         """The limb of a motion."""
         first, last = shifts.frames[0], shifts.frames[-1] + 1
         body = Body.posed(motion.skeleton, motion.root_positions[first:last], motion.rotations[first:last])
-        return cls(motion, part, shifts, body, Resting.of(body, part.chain(motion)), hold)
+        return cls(motion=motion, part=part, shifts=shifts, window=body, limb=Resting.of(body, part.chain(motion)),
+                   hold=hold)
 
     def shifted(self, change: np.ndarray) -> Motion:
         """The motion with another place and velocity (6,) of the part at the release."""

@@ -35,7 +35,7 @@ _ROUNDS = 6
 _HIT = 0.01  # m, near enough
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Kick:
     """A made kick.
 
@@ -127,9 +127,10 @@ class _Aim:
                 "kick", f"a ball of {speed:g} m/s passes the target by {np.linalg.norm(met - target):.2f} m",
                 "a target that it can reach", "kick faster, or aim lower or nearer",
             )
-        motion = kicked(self.style, self.neutral, self.foot, way[0], way[1], rate, turn, fps)
+        motion = kicked(self.style, self.neutral, self.foot, lift=way[0], loft=way[1], rate=rate, turn=turn, fps=fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
-        return Kick(place(motion, 0.0, back), BEFORE / rate, self.foot, start, *spun)
+        return Kick(motion=place(motion, 0.0, back), contact=BEFORE / rate, foot=self.foot, ball=start,
+                    velocity=spun[0], spin=spun[1])
 
 
 def _slopes(ends: np.ndarray) -> np.ndarray:

@@ -139,13 +139,11 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     skeleton = _skeleton(header["skeleton"], arrays)
     networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
     rows = entries(header["examples"], "examples")
-    model = ThrowModel(
-        settings, skeleton, networks, _reach(header["leg_reach"]),
-        tuple(_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
-        number(header["stature"], "stature"), arrays.pop("joint_limits", None), arrays.pop("reference", None),
-        text(header["trained_on"], "trained_on"),
-        tuple(text(one, "notes") for one in entries(header["notes"], "notes")),
-    )  # fmt: skip
+    model = ThrowModel(settings=settings, skeleton=skeleton, networks=networks, leg_reach=_reach(header["leg_reach"]),
+                       examples=tuple(_example(i, row, skeleton, settings.fps, arrays) for i, row in enumerate(rows)),
+                       stature=number(header["stature"], "stature"), joint_limits=arrays.pop("joint_limits", None),
+                       reference=arrays.pop("reference", None), trained_on=text(header["trained_on"], "trained_on"),
+                       notes=tuple(text(one, "notes") for one in entries(header["notes"], "notes")))  # fmt: skip
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
     return model

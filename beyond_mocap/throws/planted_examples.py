@@ -35,7 +35,7 @@ _TRIES = 50
 _INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside serves, and how often
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Planted:
     """A made throw or kick: motion, limb as in `throws.csv`, release s, position (3,) m and velocity (3,) m/s of the
     ball as it leaves, impact (3,) m where it flies through, words."""
@@ -55,7 +55,8 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
     made = subject_throws(thrower, target, speed, chance, fps)
     impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
     words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
-    return Planted(made.motion, limb, made.release, made.position, made.velocity, impact, words)
+    return Planted(motion=made.motion, limb=limb, release=made.release, position=made.position, velocity=made.velocity,
+                   impact=impact, words=words)
 
 
 def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
@@ -67,11 +68,12 @@ def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) ->
         inside = speed < _INSIDE[0] and target[2] < _INSIDE[1] and chance.uniform() < _INSIDE[2]
         style = kick_style(who, KICKS["inside" if inside else "instep"], speed, chance)
         try:
-            made = kick(tuple(target), speed, who.side, style, who.skeleton, fps)
+            made = kick(tuple(target), speed, who.side, style=style, skeleton=who.skeleton, fps=fps)
         except InputError:
             continue  # too far for this speed, or lower or higher than this foot sends it
         words = f"kick {made.foot} low {'inside' if inside else 'top'} running"
-        return Planted(made.motion, f"{made.foot}_foot", made.contact, made.ball, made.velocity, target, words)
+        return Planted(motion=made.motion, limb=f"{made.foot}_foot", release=made.contact, position=made.ball,
+                       velocity=made.velocity, impact=target, words=words)
     raise InputError("planted kicks", f"{who.name} with {who.fastest:g} m/s", "one who reaches a goal")
 
 

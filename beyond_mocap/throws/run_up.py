@@ -183,7 +183,7 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
     words = (*ACTIONS[action], OWN_WORD)
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
     row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
-    clip = Clip(_CLIP, False, motion, (row,), contacts.points(motion))
+    clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,), standing=contacts.points(motion))
     frames = joined_frames(library.frames, described([clip], library.frames))
     return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, kept=None)
 

@@ -112,7 +112,7 @@ class Order:
             raise InputError("fps", f"{self.fps:g}", f"{RATES[0]:g} to {RATES[1]:g} frames a second")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Thrown:
     """A throw or kick that hits as well as physics lets it.
 
@@ -229,7 +229,7 @@ def throw_at(
     return work.thrown(*best)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Made:
     """A motion where it belongs, at the asked rate and on the asked skeleton. plan: what it was generated from.
     release: s. raw: m that hands and feet are from their wanted ways before any correction. limits: of the limb."""
@@ -438,7 +438,8 @@ class _Work:
 
     def _wish_at(self, speed: float, ahead: float) -> Wish:
         launch = self.arcs.at(speed)
-        return Wish(speed, float(np.arctan2(launch[2], launch[0])), ahead, float(self.target[2]), self.own_limb)
+        return Wish(speed=speed, elevation=float(np.arctan2(launch[2], launch[0])), distance=ahead,
+                    height=float(self.target[2]), limb=self.own_limb)
 
     # Generating, and laying it where it is asked for.
 
@@ -456,8 +457,8 @@ class _Work:
             motion = Retargeter(motion, self.skeleton).carry(motion)
         part = part_of(self.skeleton, self.limb, self.ball)
         limits = LimbLimits.of(
-            stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), motion,
-            part.chain(motion), self.mirrored,
+            stepper(self.model).limits, own, part_of(own.skeleton, self.own_limb, self.ball).chain(own), shown=motion,
+            joints=part.chain(motion), mirrored=self.mirrored,
         )
         frame = release * motion.fps
         hips = motion.root_positions[0, :2]
@@ -470,7 +471,8 @@ class _Work:
         elif self.order.over is not None:
             anchor = cubic_at(motion, np.array([frame]))[0][0, :2]
         begin, turn = self._laid(anchor)
-        return _Made(plan, place(motion, turn, (*begin, 0.0)), release, float(np.mean(found.raw)), limits)
+        return _Made(plan=plan, motion=place(motion, turn, (*begin, 0.0)), release=release,
+                     raw=float(np.mean(found.raw)), limits=limits)
 
     def _at_rate(self, motion: Motion) -> Motion:
         fps = self.order.fps or motion.fps
@@ -490,8 +492,8 @@ class _Work:
     def corrected(self, made: _Made) -> Corrected:
         """The motion with which the ball hits, or as near as that comes."""
         order, frame = self.order, made.release * made.motion.fps
-        return corrected(made.motion, self._part(), frame, self.target, self.ball, order.freedom, order.speed,
-                         made.limits.held)  # fmt: skip
+        return corrected(made.motion, self._part(), frame, target=self.target, ball=self.ball, freedom=order.freedom,
+                         speed=order.speed, hold=made.limits.held)  # fmt: skip
 
     def thrown(self, made: _Made, found: Corrected) -> Thrown:
         """What came of it."""
@@ -505,11 +507,14 @@ class _Work:
         impact = crossing(flight, self.target)
         self._tell(found, impact, beyond)
         return Thrown(
-            found.motion, start, left, EFFECTORS[self.limb], self.ball, getattr(part, "grip", None),
-            ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch, flight, self.target, impact,
-            found.moved, found.shift, found.turned, found.pace, found.later, found.elsewhere, self.arcs.slowest,
-            self.order.speed or float(np.linalg.norm(found.velocity)), made.raw, beyond,
-            tuple(zip(made.plan.names, map(float, made.plan.weights))), tuple(self.warnings),
+            motion=found.motion, start_time=start, release=left, limb=EFFECTORS[self.limb], ball=self.ball,
+            grip=getattr(part, "grip", None),
+            path=ball_path(found.motion, part, flight, start, found.seconds + _GOES_ON), launch=launch, flight=flight,
+            target=self.target, impact=impact, moved=found.moved, shift=found.shift, turned=found.turned,
+            pace=found.pace, later=found.later, elsewhere=found.elsewhere, slowest=self.arcs.slowest,
+            asked_speed=self.order.speed or float(np.linalg.norm(found.velocity)), raw_deviation=made.raw,
+            beyond=beyond, examples=tuple(zip(made.plan.names, map(float, made.plan.weights))),
+            warnings=tuple(self.warnings),
         )  # fmt: skip
 
     def _check_body(self, found: Corrected) -> None:

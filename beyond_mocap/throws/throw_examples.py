@@ -52,7 +52,7 @@ _TARGET_AWAY = (0.5, 200.0)  # m from the ball as it leaves to where it flew thr
 _UNDER_FLOOR = 0.5  # m that a target may lie under what is taken for the floor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Action:
     """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are
     wanted at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
@@ -66,13 +66,15 @@ class Action:
 
 
 ACTIONS = {
-    "throw": Action(frozenset(list_labels(action="throw")), (0, 1), (1.6, 3.0), (1.2, 2.0), 4.0, BASEBALL),
-    "kick": Action(frozenset(list_labels(action="kick")), (2, 3), (1.2, 3.0), (0.8, 2.0), 11.0, FOOTBALL),
+    "throw": Action(words=frozenset(list_labels(action="throw")), limbs=(0, 1), before=(1.6, 3.0), after=(1.2, 2.0),
+                    wall=4.0, ball=BASEBALL),
+    "kick": Action(words=frozenset(list_labels(action="kick")), limbs=(2, 3), before=(1.2, 3.0), after=(0.8, 2.0),
+                   wall=11.0, ball=FOOTBALL),
 }
 """The walls: Fredriksson's stood about 4 m away (§8.2); a penalty is shot from 11 m."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Known:
     """What was written about one throw; None is unknown. stretch, release: s. target, launch: (3,). speed m/s."""
 
@@ -123,7 +125,8 @@ def examples_in(
             without.append(name)
             continue
         try:
-            found += _of_clip(path, name, ACTIONS[action], words, table.get(name), fps, bring, told)
+            found += _of_clip(path, name, ACTIONS[action], words=words, rows=table.get(name), fps=fps, bring=bring,
+                              told=told)
         except InputError as error:
             told(f"{name}: left out, {error}")
     if len(without) == len(clips):
@@ -185,7 +188,8 @@ def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: flo
     for order, known in enumerate(every):
         own = name if len(every) == 1 else f"{name} {order + 1}"
         try:
-            out.append(_example(own, motion, known, action, fps, bring, _subject(name, known, motion)))
+            out.append(_example(own, motion, known, action=action, fps=fps, bring=bring,
+                                who=_subject(name, known, motion)))
         except BeyondMocapError as error:
             told(f"{own}: left out, {error}")
     return out
@@ -231,7 +235,8 @@ def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> It
             continue
         last = release
         sides = [side for side, word in enumerate(("left", "right")) if word in row.words]
-        yield _Known((row.start / fps, row.end / fps), release, action.limbs[sides[0]] if len(sides) == 1 else None)
+        yield _Known(stretch=(row.start / fps, row.end / fps), release=release,
+                     limb=action.limbs[sides[0]] if len(sides) == 1 else None)
 
 
 def _table(folder: Path, action: Action, names: set[str]) -> dict[str, list[_Known]]:
@@ -268,10 +273,8 @@ def _row(row: dict[str, str], where: str) -> _Known:
         if fast is not None and not 0.0 < fast <= _FASTEST:
             expected = f"more than 0, at most {_FASTEST:g} m/s"
             raise InputError(where, f"{name} {fast:g} m/s", expected, "correct the cell or leave it empty")
-    return _Known(
-        None, value("release_s"), LIMBS.index(limb) if limb else None, vector(TARGET), launch, speed,
-        (row.get("subject") or "").strip() or None,
-    )
+    return _Known(stretch=None, release=value("release_s"), limb=LIMBS.index(limb) if limb else None,
+                  target=vector(TARGET), launch=launch, speed=speed, subject=(row.get("subject") or "").strip() or None)
 
 
 def _report_of(path: Path) -> Path:
@@ -295,7 +298,7 @@ def _measured(path: Path, action: Action) -> _Known | None:
             raise ValueError
     except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
         raise InputError(path, "no report of a release", "what the command 'release' writes") from None
-    return _Known(None, release, limb, impact, launch, speed)
+    return _Known(stretch=None, release=release, limb=limb, target=impact, launch=launch, speed=speed)
 
 
 class _Bring:
@@ -334,7 +337,8 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
     if there is not cut:  # the same launch from another hand's place
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
     begin, end = _stretch(motion, known, action)
-    return example_of(name, who, there, limb, release, impact, launch, fps, (begin - first, end - first))
+    return example_of(name, who, there, limb=limb, release=release, impact=impact, launch=launch, fps=fps,
+                      span=(begin - first, end - first))
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:

@@ -145,7 +145,8 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
     frames = np.arange(wish.first, wish.last + 1)
     if wish.body is None:
         there = np.array([wish.place])
-        return Strikes(frames[:1], there, there, -BALLS[wish.ball].radius, np.zeros((1, 3)))
+        return Strikes(frames=frames[:1], start=there, end=there, radius=-BALLS[wish.ball].radius,
+                       velocity=np.zeros((1, 3)))
     key = (wish.body.session_uid, wish.part, wish.side, wish.bone, wish.first, wish.last, frames_per_second(scene))
     if key not in _strikes:
         motion, first = motion_of(scene, wish.body)
@@ -178,14 +179,15 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
     ground = wish.way == "GROUND"
     turns = (wish.back, wish.left)
-    shot = shoot(strikes, target, kind, seconds, wish.bounces, turns, ground, fastest, what=f"ball {name}")
+    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=turns, ground=ground,
+                 fastest=fastest, what=f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
     times = np.linspace(0.0, shot.seconds, STROKES)
     ways, _ = courses(shot.starts[can], shot.aimed.velocity[can], shot.aimed.spin[can], kind, times)
-    return Solved(made_of, shot, strikes, flight, int(strikes.frames[shot.chosen]), fps,
-                  tuple(target), ways)
+    return Solved(made_of, shot, strikes, flight=flight, strike=int(strikes.frames[shot.chosen]), fps=fps,
+                  target=tuple(target), candidates=ways)
 
 
 def digest(wish: Wish, strikes: "Strikes") -> str:

@@ -69,7 +69,7 @@ def content(state: State, who: str, told: str = "", folded: bool = False) -> Con
     """What the menu says in a state. told: what was done last; folded: no list before a first word is chosen."""
     rows = tuple(
         Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
-            option.word, not option.served, option.chosen)
+            word=option.word, faint=not option.served, chosen=option.chosen)
         for option in state.shown
     )
     more = [f"= more ({state.page + 1}/{state.pages})"] if state.pages > 1 else []
@@ -113,7 +113,8 @@ def laid_out(
         rects.append((x, y, x + (column if columns > 1 else wide - 2 * edge), y + row))
     feet = [(left + edge, first - (tallest + number + 1) * row) for number in range(len(content.foot))]
     box = (left, top - tall, left + wide, top)
-    return Box(content, box, tuple(rects), (left + edge, first), tuple(feet), (key, key + text), size)
+    return Box(content, box, tuple(rects), head=(left + edge, first), foot=tuple(feet), offsets=(key, key + text),
+               size=size)
 
 
 def letters() -> float:

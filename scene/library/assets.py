@@ -52,7 +52,7 @@ def draft(name: str, motion: "Motion", rows, told: str = "", action: str = "") -
     longest = max(rows, key=lambda row: row.end - row.start, default=None)
     middle = (longest.start + longest.end) // 2 if longest is not None else len(motion) // 2
     frame = min(keys[0] if keys else middle, len(motion) - 1)
-    return Draft(name, motion, words_of(rows)[0], frame, told, action)
+    return Draft(name, motion, words_of(rows)[0], frame=frame, told=told, action=action)
 
 
 def picture(one: Draft) -> np.ndarray | None:

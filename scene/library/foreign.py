@@ -192,7 +192,7 @@ def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, 
     matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender gives columns first
     if not np.all(np.isfinite(matrices)):
         raise InputError(path, f"action {action.name} with numbers that are none", "an intact file", "export it anew")
-    return Take(action.name, _motion(path, rig, bones, matrices, world[0], fps))
+    return Take(action.name, _motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))
 
 
 def _times(action, slot, rate: float) -> tuple[float, np.ndarray]:

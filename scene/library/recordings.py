@@ -57,7 +57,7 @@ def show(context: bpy.types.Context, motion: "Motion", path: str, dressed: bool)
     rig[PATH], rig[FOLDER] = path, scene.beyond_mocap.library_folder
     action.write(rig, motion, scene, name=name)
     if dressed:
-        body.create(rig, name, SHIRT, context.collection, scene, motion)
+        body.create(rig, name, SHIRT, collection=context.collection, scene=scene, example=motion)
     for other in context.selected_objects:
         other.select_set(False)
     rig.select_set(True)

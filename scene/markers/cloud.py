@@ -108,7 +108,8 @@ def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
     places[~seen.reshape(samples, count)] = np.nan
     events = tuple(MarkerEvent(row.seconds, row.name, row.side) for row in kept.events)
     names = tuple(label.name.strip() for label in kept.labels)
-    trial = MarkerTrial(names, places, kept.fps, None, events, kept.start, cloud.name, kept.subject)
+    trial = MarkerTrial(labels=names, positions=places, fps=kept.fps, residuals=None, events=events, start=kept.start,
+                        name=cloud.name, subject=kept.subject)
     there = np.unique(markers(cloud))
     if not len(there):
         raise InputError(cloud.name, "no vertex that is a marker", "one for each", "import the recording again")

@@ -55,8 +55,8 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     words = tuple(chosen.words.split()) if chosen.add else ()
     return Order(
         cloud.name, trial, static and clouds.read(static, scene),
-        models.of_cloud(cloud) if kept.use_model else None, settings_of(cloud, chosen, words),
-        clip_place(scene, cloud.name) if chosen.add else None, words,
+        model=models.of_cloud(cloud) if kept.use_model else None, settings=settings_of(cloud, chosen, words),
+        add=clip_place(scene, cloud.name) if chosen.add else None, words=words,
     )
 
 
@@ -104,7 +104,7 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
         room = cloud.users_collection[0] if cloud.users_collection else context.collection
         thing = kept.body = armature.create(context, made.motion.skeleton, f"{cloud.name} body", room)
     if scene.beyond_mocap_markers.dressed and not any(child.type == "MESH" for child in thing.children):
-        body.create(thing, thing.name, SKIN, thing.users_collection[0], scene, made.motion)
+        body.create(thing, thing.name, SKIN, collection=thing.users_collection[0], scene=scene, example=made.motion)
     thing.matrix_world = Matrix()
     context.view_layer.update()
     slowed = clouds.played_rate(cloud, scene) / kept.fps

@@ -87,7 +87,7 @@ def repaint(scene: bpy.types.Scene, colours: dict[str, str]) -> None:
     worn = {cloth for team in TEAMS for thing in ours.meshes(scene, team) for cloth in thing.data.materials}
     for team in USUAL:
         for keeper in (False, True):
-            kit = kit_of(Person("", "", -1, team, keeper, ()), colours)
+            kit = kit_of(Person("", "", -1, team=team, keeper=keeper, motions=()), colours)
             for part, rgb in _own(kit).items():
                 for material in worn & set(_all_of(kit, part)):
                     _paint(material, rgb)

@@ -53,12 +53,15 @@ def scenery(
     start, end = _span(wanted, state)
     course = Path(wanted.folder) / "ball.csv"
     ball = read_ball(course) if course.is_file() else None
-    people, lines = _people(wanted, state, library, ball, (start, end), progress, cancelled)
+    people, lines = _people(
+        wanted, state, library, ball=ball, span=(start, end), progress=progress, cancelled=cancelled,
+    )
     if not people:
         found = f"nobody is there from {told_time(start)} to {told_time(end)} s"
         raise InputError(wanted.folder, found, "a time of play", *lines[:1])
     length, width = map(float, state["pitch_m"])
-    seen = Scenery(start, end, length, width, wanted.colours, tuple(people), _between(ball, start, end))
+    seen = Scenery(start, end, length, width=width, colours=wanted.colours, people=tuple(people),
+                   ball=_between(ball, start, end))
     return library, seen, tuple(lines)
 
 
@@ -118,7 +121,7 @@ def _person(player: dict, motions: tuple) -> Person:
     team = player.get("team") if player.get("team") in TEAMS else "home"
     position = str(player.get("position") or "")
     keeper = "keeper" in position.lower() or (not position and number == 1)
-    return Person(player["id"], str(player.get("name") or ""), number, team, keeper, motions)
+    return Person(player["id"], str(player.get("name") or ""), number, team=team, keeper=keeper, motions=motions)
 
 
 def _between(ball: "BallPath | None", start: float, end: float) -> "BallPath | None":

@@ -32,7 +32,7 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
         dressed = _dressed(context, scenery)
     with _clock(took, "keys"):
         for person, worn in dressed:
-            baked.bake(scene, person, worn, scenery.start, first, last)
+            baked.bake(scene, person, worn, start=scenery.start, first=first, last=last)
         if scenery.ball is not None:
             baked.bake_ball(context, scenery.ball, scenery.start, first, last)
     with _clock(took, "cameras"):

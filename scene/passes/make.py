@@ -80,8 +80,8 @@ def order_of(scene: bpy.types.Scene) -> Order:
     # without the library's folder: a file may be moved with it
     digest = byte_digest(repr((wanted, chosen, unit, settings.start_frame))).hex()
     return Order(
-        wanted, float(settings.start_frame), folder, unit, session.library(folder, unit), digest,
-        preferences.for_build(folder),
+        wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit), digest=digest,
+        build=preferences.for_build(folder),
     )
 
 
@@ -195,7 +195,7 @@ def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float)
     if target is None:
         target = armature.create(bpy.context, take.motion.skeleton, row.name, room)
         target[KEPT] = True
-        dressed = body.create(target, row.name, tuple(row.shirt), room, scene, take.motion)
+        dressed = body.create(target, row.name, tuple(row.shirt), collection=room, scene=scene, example=take.motion)
         dressed[KEPT] = True
         row.body = target
     elif not target.get(KEPT) and not row.before.kept:

@@ -122,7 +122,7 @@ def _player(scene, row: BeyondMocapPasser) -> Player:
     place, facing = stands(scene, row.place)
     tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
-    return Player(row.name, place, facing, row.bone or row.part, side, tool, _exact(row.height))
+    return Player(row.name, place, facing, part=row.bone or row.part, side=side, tool=tool, height=_exact(row.height))
 
 
 def _tool(row: BeyondMocapPasser) -> Tool:
@@ -136,7 +136,8 @@ def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
         own = (giver.bone or giver.part, giver.side)
         part, side = (mine if mine != "own" else usual for mine, usual in zip((row.part, row.side), own))
         tool = _tool(giver) if part == "tool" else None
-        return Example("", hit=examples.hit_of(scene, row, number, part, "" if side == "either" else side, tool))
+        return Example("", hit=examples.hit_of(scene, row, number, part=part, side="" if side == "either" else side,
+                                               tool=tool))
     return Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
 
 
@@ -144,9 +145,9 @@ def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
     return Pass(
-        row.who, row.to, row.kind, row.bounces, None if row.part == "own" else row.part, side,
-        _exact(row.seconds) or None, at,
-        _example(scene, row, number), "" if row.error == "none" else row.error,
+        row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
+        seconds=_exact(row.seconds) or None, at=at,
+        example=_example(scene, row, number), error="" if row.error == "none" else row.error,
     )  # fmt: skip
 
 

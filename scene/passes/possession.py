@@ -105,7 +105,8 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     for hold in holds:
         a, b = hold.first - frames[0], hold.last - frames[0]
         bones = _bones(scene, hold)
-        seen = _carried(scene, hold, bones, own[a], own[b] if ends is not None and ends[1] > hold.last else None, ball)
+        seen = _carried(scene, hold, bones, start=own[a],
+                        end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
         inverse = bones[0]
         ball.constraints[hold.name].inverse_matrix = inverse.inverted()
         lets_go.append((hold, inverse @ seen[-1]))

@@ -50,11 +50,10 @@ def of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
         times = np.unique(np.concatenate([np.arange(flight.launch.time, end, STEP), bounces, [end]]))
         ways.append(flight.at(times))
         met += list(flight.at(bounces) * [1.0, 1.0, 0.0]) if len(bounces) else []
-    return Rally(
-        start, np.array([flight.launch.time for flight in plan.flights]), tuple(ways),
-        np.array([one.order.time for one in plan.strikes]), np.array([one.order.ball for one in plan.strikes]),
-        np.array(met).reshape(-1, 3), tuple(_candidates(one, ball) for one in plan.strikes),
-    )  # fmt: skip
+    return Rally(start, np.array([flight.launch.time for flight in plan.flights]), tuple(ways),
+                 strike_times=np.array([one.order.time for one in plan.strikes]),
+                 strikes=np.array([one.order.ball for one in plan.strikes]), bounces=np.array(met).reshape(-1, 3),
+                 candidates=tuple(_candidates(one, ball) for one in plan.strikes))  # fmt: skip
 
 
 def _candidates(strike, ball: "Ball") -> np.ndarray:

@@ -55,7 +55,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
     if player.feed_id:
         end = settings.section_end if settings.section_end > settings.section_start else None
         path, metadata = absolute(player.tracking_file), absolute(player.metadata_file)
-        return Order((), path, metadata, player.provider, settings.section_start, end)
+        return Order((), path, metadata, provider=player.provider, start=settings.section_start, end=end)
     others = [one for one in settings.players if one.use and one != player and one.tracking_file and not one.feed_id]
     return Order(tuple((one.name, tracks.read_track(settings, one)) for one in (player, *others)))
 
@@ -87,8 +87,9 @@ def together(named: tuple):
     height = np.where(first.ball_height_known, first.ball[:, 2], np.nan)
     players = tuple(MatchPlayer(name, "", name, -1) for name, _ in named)
     fps = 1.0 / float(np.median(np.diff(times)))
-    return Match(times, players, places, np.column_stack([first.ball[:, :2], height]), *PITCH, fps, "csv",
-                 ((float(times[0]), float(times[-1])),))
+    samples = np.column_stack([first.ball[:, :2], height])
+    return Match(times=times, players=players, positions=places, ball=samples, length=PITCH[0], width=PITCH[1], fps=fps,
+                 provider="csv", periods=((float(times[0]), float(times[-1])),))
 
 
 def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:

@@ -74,7 +74,7 @@ def _follower(scene, body, until: float):
         frames, hips = _looked_at(scene, body, until)
     if not np.isfinite(hips).all():
         raise InputError("its pose", "a place that is no number", "numbers", "look at its keys")
-    return Follower(body.name, frames / frames_per_second(scene), hips - (0.0, 0.0, HIPS))
+    return Follower(name=body.name, times=frames / frames_per_second(scene), places=hips - (0.0, 0.0, HIPS))
 
 
 def _looked_at(scene, body, until: float) -> tuple[np.ndarray, np.ndarray]:

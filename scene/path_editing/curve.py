@@ -109,7 +109,8 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
     kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
     order = spline.order_u if kind == "NURBS" else 0
     still = points.tobytes() + repr(units).encode() if animated else values.tobytes()
-    return Drawn(drawn.name, kind, values, order, spline.use_endpoint_u, spline.use_cyclic_u, still, tuple(notes))
+    return Drawn(drawn.name, kind, values, order=order, clamped=spline.use_endpoint_u, closed=spline.use_cyclic_u,
+                 still=still, notes=tuple(notes))
 
 
 def create(

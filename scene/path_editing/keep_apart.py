@@ -51,8 +51,9 @@ class Trial:
         times = (self.first + np.arange(len(ridden.motion))) / fps
         places = np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]])
         if not may_change:
-            return Follower(self.name, times, places)
-        return Follower(self.name, times, places, self.path, ridden.arc, self.settings.by_arc_length)
+            return Follower(name=self.name, times=times, places=places)
+        return Follower(name=self.name, times=times, places=places, path=self.path, arc=ridden.arc,
+                        by_arc=self.settings.by_arc_length)
 
 
 @dataclass(frozen=True)
@@ -136,7 +137,8 @@ def _trial(scene, body) -> Trial:
     settings = RideSettings(**{**wishes(ride), "detours": (), "delay": round(_own_delay(ride), 6)})
     known = source.of(carrier, scene, settings)
     ground = source.ground_of(scene, ride.ground, source.ground_digest(scene, ride.ground))
-    return Trial(body.name, known.read.first, known.core, curve.read(scene, ride.curve).path(), settings, ground)
+    return Trial(body.name, known.read.first, known.core, path=curve.read(scene, ride.curve).path(), settings=settings,
+                 ground=ground)
 
 
 def _own_delay(ride) -> float:

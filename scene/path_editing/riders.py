@@ -114,7 +114,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     _counted += 1
     first, fps = known.read.first, known.read.motion.fps
     told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
-    now = Shown(first, fps, known.core, path, ridden, _counted, told)
+    now = Shown(first, fps, known.core, path=path, ridden=ridden, number=_counted, told=told)
     _shown[body.session_uid] = digest, now
     _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
     return True
@@ -215,7 +215,7 @@ def new_curve(
     else:
         settings = RideSettings(**wishes(ride))
         path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
-    made = curve.create(context, f"{body.name} path", path, straight, count, kind, degree)
+    made = curve.create(context, f"{body.name} path", path, straight=straight, count=count, kind=kind, degree=degree)
     try:
         change(scene, body, made)
     except BeyondMocapError:

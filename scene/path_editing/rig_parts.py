@@ -61,7 +61,7 @@ def of_rig(rig: bpy.types.Object) -> Parts | None:
     spine = [part for part in shown if part.startswith("spine")]
     trunk = {"chest": spine[-1]} if spine and {"torso", "chest"} <= set(rig.data.bones.keys()) else {}
     follows = list_followers(rig, controls, shown, _SAME * _size(rig))
-    return Parts(controls, shown, follows, trunk, table.get("root", ""), True)
+    return Parts(controls, shown, follows, trunk=trunk, root=table.get("root", ""), humanoid=True)
 
 
 def _shown(rig: bpy.types.Object, control: str) -> str:
@@ -139,7 +139,9 @@ def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps
             back = quaternion.inverse(world[:, parent])
             local[:, joint] = quaternion.multiply(back, world[:, joint])
             offsets[joint] = _constant(quaternion.rotate(back, places[:, joint] - places[:, parent]))
-    ends, tips = _tips(rig, parts, parents, rest, seen, units) if parts.humanoid else ((), np.zeros((0, 3)))
+    ends, tips = _tips(
+        rig, parts, parents, rest=rest, seen=seen, units=units,
+    ) if parts.humanoid else ((), np.zeros((0, 3)))
     joints = tuple(bone_maps.JOINTS.get(name, f"Bone {name}") for name in names)
     skeleton, local = Skeleton(joints, tuple(parents), offsets, ends, tips), quaternion.continuous(local)
     if parts.humanoid:
@@ -230,7 +232,7 @@ def whole(rig: bpy.types.Object, seen: Look, object_keyed: bool, units: float) -
             break
     lowest = min(bones, key=lambda name: float(places[0, bones.index(name), 2]))
     shown = {"body": main} | ({"lowest": lowest} if lowest != main else {})
-    return Parts({}, shown, {}, {}, "", False)
+    return Parts({}, shown, {}, trunk={}, root="", humanoid=False)
 
 
 def is_root(rig: bpy.types.Object, parts: Parts) -> bool:

@@ -176,7 +176,7 @@ class Carried:
             limb = name in self.parts.controls.values() and name != self.parts.controls.get("hips")
             slides = own != place and not limb and not rig.data.bones[name].use_connect
             if {turn, place} != {own}:
-                found.append(Control(name, own, turn, place, axes, slides))
+                found.append(Control(name, own, turn, place=place, axes=axes, slides=slides))
         return [*found, *self._bent(rig)]
 
     def _bent(self, rig: bpy.types.Object) -> list[Control]:
@@ -190,7 +190,8 @@ class Carried:
                     for held in reversed(chain):
                         above = self.group.get(held.parent.name) if held.parent is not None else None
                         if held.name in self.parts.shown.values() and above is not None:
-                            found.append(Control(held.name, self.group[held.name], above, above, above, False))
+                            found.append(Control(held.name, self.group[held.name], above, place=above, axes=above,
+                                                 slides=False))
         self.held = {control.name for control in found}
         return found
 

@@ -43,7 +43,8 @@ class RigSource:
         self._rows: Rows | None = None
         self._ways = seen.lies @ np.linalg.inv(seen.basis)
         self._hangs = bool(np.ptp(self._ways, axis=0).max() > 1e-6)
-        self.seen, self.carried = seen, Carried(rig, parts, seen, rides, played.object_keyed, self.motion, self.units)
+        self.seen, self.carried = seen, Carried(rig, parts, seen, rides=rides, object_keyed=played.object_keyed,
+                                                motion=self.motion, units=self.units)
 
     def values(self, ridden, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
         """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source,

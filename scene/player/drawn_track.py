@@ -52,7 +52,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
         found = line_of(scene, drawn)
         level = found.line[:, :2]
         way = distance_along(level)
-        return along(level, way[found.at], found.speeds, found.waits, start, f"curve {drawn.name}")
+        return along(level, way[found.at], found.speeds, waits=found.waits, start=start, name=f"curve {drawn.name}")
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
     frames, places = _animated(scene, drawn, still)

@@ -94,10 +94,9 @@ def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How,
         found = f"no take of {player.name} in this session"
         raise InputError("a stretch made anew", found, "a take", "press Update first, which makes it again")
     folder, unit = absolute(settings.library_folder), settings.library_unit or None
-    return Order(
-        player.name, how, plan, plans.words_from(player), warnings, player.take, made.take if made else None,
-        json.loads(player.result.recipe or "{}"), folder, unit, preferences.for_build(folder),
-    )
+    return Order(player.name, how, plan, where=plans.words_from(player), warnings=warnings, begin=player.take,
+                 before=made.take if made else None, recipe=json.loads(player.result.recipe or "{}"), folder=folder,
+                 unit=unit, build=preferences.for_build(folder))
 
 
 def work(order: Order, library: "Library | None", progress, cancelled, hurry) -> Result:
@@ -169,7 +168,7 @@ def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...
         if number and hurry():
             break
         try:
-            take = synthesize(clips, plan, tell, cancelled, hurry, used)
+            take = synthesize(clips, plan, tell, cancelled=cancelled, hurry=hurry, used=used)
         except Cancelled:
             if cancelled() or not found:
                 raise

@@ -53,7 +53,7 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
         else:
             turns[bone] = turned(root_turn, bone)
             places[bone] = placed(root_place)
-    _follow(driven, turns, places, hips, world, motion, placed)
+    _follow(driven, turns, places, hips=hips, world=world, motion=motion, placed=placed)
     return turns, places, told
 
 

@@ -124,7 +124,8 @@ def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
     turn_of, worst = steadiest_carrier(turn_spread(carried, base), len(controls))
     parent_of, _ = steadiest_carrier(turn_spread(carried, parents), 0)
     place_of, off = steadiest_carrier(place_spread(carried, origin, rests), len(controls))
-    return Rides(list(controls), carriers, turn_of, place_of, parent_of, (worst < 10 * RIDES) & (off < RIDES * size))
+    return Rides(list(controls), carriers, turn_of, place_of=place_of, parent_of=parent_of,
+                 firm=(worst < 10 * RIDES) & (off < RIDES * size))
 
 
 def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str], shown: list[str]) -> list[bool]:

@@ -42,7 +42,7 @@ def stage(take: Take) -> tuple[str, ...]:
     scene.frame_start, scene.frame_end = 0, len(take.motion) - 1
     room = bake.collection(scene)
     player = armature.create(bpy.context, take.motion.skeleton, NAME, room)
-    body.create(player, NAME, SHIRT, room, scene, take.motion)
+    body.create(player, NAME, SHIRT, collection=room, scene=scene, example=take.motion)
     action.write(player, take.motion, scene, 0.0, f"{NAME} take")
     if take.ball is not None:
         first = (float(take.ball.times[0]) - take.start_time) * take.motion.fps

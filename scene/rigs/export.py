@@ -183,7 +183,7 @@ def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: 
         poses = {name: in_place @ pose for name, pose in poses.items()}
     if line is not None:
         poses[root or ROOT_BONE] = line
-    parents = _plain(stage, copy, rig, kept, hips if line is not None and root is None else None, told)
+    parents = _plain(stage, copy, rig, kept=kept, hips=hips if line is not None and root is None else None, told=told)
     _play(copy, poses, parents, shown.lies, wanted)
     return copy
 

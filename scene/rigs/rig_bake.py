@@ -58,7 +58,8 @@ def fitted(
     turns, places, told = wanted(driven, fit.motion, frames, options.root)
     basis, heads = driven.controls.basis(turns, places)
     curves = bone_curves(rig, basis) | setting_curves(driven, options.bakes_ik)
-    return Fitted(source.name, driven, fit, frames, curves, heads, [*_told(driven, options), *told, *fit.told])
+    return Fitted(source.name, driven, fit, frames=frames, curves=curves, heads=heads,
+                  told=[*_told(driven, options), *told, *fit.told])
 
 
 def lay(one: Fitted) -> Baked:

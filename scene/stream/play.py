@@ -46,7 +46,8 @@ def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> 
     library = order.library
     if library is None:
         library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
-    return Begun(order, library, live_passes.begin(library, order.scene, holder, start, progress, cancelled))
+    return Begun(order, library, live_passes.begin(library, order.scene, holder, start=start, progress=progress,
+                                                   cancelled=cancelled))
 
 
 def show(scene: bpy.types.Scene, begun: Begun) -> None:
@@ -151,7 +152,7 @@ def _order(scene, hit: HitMotion) -> tuple:
 def _answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, progress, cancelled) -> Piece:
     from ...beyond_mocap.passes.live_passes import answer
 
-    return answer(library, one, now, hit, to, bounces, progress, cancelled)
+    return answer(library, one, now, hit=hit, target=to, bounces=bounces, progress=progress, cancelled=cancelled)
 
 
 def _ended(scene, job) -> None:

@@ -31,7 +31,7 @@ def create(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> 
     """A dressed armature for the body that `motion` shows."""
     where = bake.collection(context.scene)
     thing = armature.create(context, motion.skeleton, name, where)
-    body.create(thing, name, SHIRT, where, context.scene, motion)
+    body.create(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
     thing[MARK] = True
     return thing
 

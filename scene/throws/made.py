@@ -55,7 +55,8 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
         own = Retargeter(own, order.skeleton, keeps_travel=True).carry(own)
     start = order.first / order.fps
     asked = order
-    order, thrown, seconds = _met(order, own, start, library is not None, _share(progress, 0.0, 0.3), cancelled)
+    order, thrown, seconds = _met(order, own, start, joined=library is not None, progress=_share(progress, 0.0, 0.3),
+                                  cancelled=cancelled)
     motion, release = _shown(order, thrown, library is not None)
     told: tuple = ()
     if library is not None:
@@ -73,7 +74,8 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     joined = replace(joined, motion=raised)
     launch = replace(thrown.launch, time=0.0, position=thrown.launch.position + up)
     flight = fly(launch, thrown.ball, seconds + FOLLOWED)
-    return Result(order, thrown, joined, flight, seconds, library, float(transition_jerk(joined).max()), usual)
+    return Result(order, thrown, joined, flight=flight, seconds=seconds, library=library,
+                  jerk=float(transition_jerk(joined).max()), usual_jerk=usual)
 
 
 def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
@@ -82,7 +84,7 @@ def _met(order: Order, own: "Motion", start: float, joined: bool, progress, canc
     seconds = _GUESS
     for _ in range(_ROUNDS):
         target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
-        thrown = _thrown(order, target, own, start, joined, progress, cancelled)
+        thrown = _thrown(order, target, own, start=start, joined=joined, progress=progress, cancelled=cancelled)
         guessed, seconds = seconds, _seconds(thrown)
         late = int(np.ceil((order.begins + _shown(order, thrown, joined)[1] - order.at) * order.fps - 1e-6))
         if order.waits and late > 0:
@@ -126,17 +128,20 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
 
     model = _model(order)
     if order.ball_place is not None:
-        return _thrown_from(order, target, model, {"ball_place": tuple(order.ball_place)}, progress, cancelled)
+        return _thrown_from(order, target, model, where={"ball_place": tuple(order.ball_place)}, progress=progress,
+                            cancelled=cancelled)
     if order.own is None:
-        return _thrown_from(order, target, model, {"start": tuple(order.place)}, progress, cancelled)
-    thrown = _thrown_from(order, target, model, {"over": spot(order.at)}, progress, cancelled)
+        return _thrown_from(order, target, model, where={"start": tuple(order.place)}, progress=progress,
+                            cancelled=cancelled)
+    thrown = _thrown_from(order, target, model, where={"over": spot(order.at)}, progress=progress, cancelled=cancelled)
     motion, release = _shown(order, thrown, joined)
     begin = order.at - release
     if not joined:
-        return _thrown_from(order, target, model, {"start": spot(begin)}, progress, cancelled)
+        return _thrown_from(order, target, model, where={"start": spot(begin)}, progress=progress, cancelled=cancelled)
     if is_in_reach(own, start, motion, release, order.at):
         return thrown
-    return _thrown_from(order, target, model, {"start": tuple(stopping_place(own, start, begin))}, progress, cancelled)
+    return _thrown_from(order, target, model, where={"start": tuple(stopping_place(own, start, begin))},
+                        progress=progress, cancelled=cancelled)
 
 
 def _model(order: Order):

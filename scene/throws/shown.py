@@ -34,7 +34,8 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
         session.keep_library(result.library, result.order.unit)
     name, start, more = f"{body.name} {result.order.act}s", joined.start * fps, []
     if result.order.table:
-        more = rigged.lay(scene, body, result.order.table, joined.motion, int(round(start)), result.order.act)
+        more = rigged.lay(scene, body, result.order.table, motion=joined.motion, start=int(round(start)),
+                          name=result.order.act)
         wish.rigged = True
     else:
         if not wish.before.kept:

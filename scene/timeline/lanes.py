@@ -123,7 +123,8 @@ def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
             if shows(strip, marker):
                 frame = marker_frame(strip, marker)
                 off = track.mute or strip.mute
-                placed = PlacedMoment(key_of(marker, frame, clock, where), strip.name, index, frame, off, marker.select)
+                placed = PlacedMoment(key_of(marker, frame, clock, where), strip.name, index, frame=frame, off=off,
+                                      selected=marker.select)
                 others = found.setdefault((frame, placed.words), [])
                 if all(other.strip == strip.name for other in others):
                     others.append(placed)

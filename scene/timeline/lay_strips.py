@@ -79,7 +79,7 @@ def add_moment(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> Placed
     own(target, clock)
     strip, index = _mark(target, key, clock)
     pick(target, strip.name, index)
-    return PlacedMoment(key, strip.name, index, clock.whole(key.time), False, True)
+    return PlacedMoment(key, strip.name, index, frame=clock.whole(key.time), off=False, selected=True)
 
 
 def remove_span(target: bpy.types.Object, strip_name: str) -> None:
@@ -120,7 +120,7 @@ def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: Ke
         return add_moment(target, key, clock)
     tell(strip.action.pose_markers[index], key, _on_action(strip, frame))
     pick(target, strip_name, index)
-    return PlacedMoment(key, strip_name, index, frame, False, True)
+    return PlacedMoment(key, strip_name, index, frame=frame, off=False, selected=True)
 
 
 def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:

@@ -61,7 +61,8 @@ def names(context: bpy.types.Context, region: bpy.types.Region) -> list[Name]:
         rows[row].append((left - GAP * scale, left + width + GAP * scale))
         bottom = (BOTTOM + row * ROW) * scale
         box = (left, bottom, left + width, bottom + (ROW - 2) * scale)
-        found.append(Name(text, target, strip, index, frame, x, box, picked, off, (target, frame) in wrong))
+        found.append(Name(text, target, strip, index=index, frame=frame, x=x, box=box, picked=picked, off=off,
+                          wrong=(target, frame) in wrong))
     return found
 
 

@@ -70,7 +70,7 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
             group.listed.remove(index)
     first = len(group.listed)
     for one in found:
-        add(target, one.annotation, one.source, one.confidence, state, one.why)
+        add(target, one.annotation, one.source, confidence=one.confidence, state=state, why=one.why)
     group.active = first if first < len(group.listed) else 0
 
 

@@ -50,8 +50,9 @@ def linear_model(examples, action="throw", ridge=1.0):
     units = max(part.answers.shape[1] for part in rows.values())
     settings = ModelSettings(points=1, layers=1, units=units, action=action)
     return ThrowModel(
-        settings, examples[0].motion.skeleton, {name: _linear(part, units, ridge) for name, part in rows.items()},
-        leg_reach(examples), tuple(examples),
+        settings=settings, skeleton=examples[0].motion.skeleton,
+        networks={name: _linear(part, units, ridge) for name, part in rows.items()}, leg_reach=leg_reach(examples),
+        examples=tuple(examples),
         joint_limits=learn(np.concatenate([example.motion.rotations for example in examples])),
     )  # fmt: skip
 

@@ -68,7 +68,8 @@ def test_regression_that_saw_poses_beside_the_truth_comes_back_to_it(examples):
         trained = Networks(recordings(examples), chains, config, reach, limits)
         params = trained.first(jax.random.key(0))
         networks = {name: to_use(params[name], trained.scales[name]) for name in params}
-        says = OneFrame(ThrowModel(trained.settings, chains.skeleton, networks, reach, tuple(examples)), chains)
+        says = OneFrame(ThrowModel(settings=trained.settings, skeleton=chains.skeleton, networks=networks,
+                                   leg_reach=reach, examples=tuple(examples)), chains)
         found = [says(*(type(part)(*(one[frame] for one in part)) for part in (turned, window))).positions
                  for frame in (8, 12, 20, 25)]
         facing = [

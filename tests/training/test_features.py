@@ -14,7 +14,7 @@ from beyond_mocap.throws.networks.model import ModelSettings
 from beyond_mocap.throws.networks.training_set import leg_reach, steps
 
 TARGET = (12.0, 3.0, 1.2)
-CASES = [ModelSettings(guided=True, carried=True), ModelSettings("single", wrist="inferred", frame="static")]
+CASES = [ModelSettings(guided=True, carried=True), ModelSettings(kind="single", wrist="inferred", frame="static")]
 
 
 @pytest.fixture(scope="module")

@@ -50,10 +50,9 @@ def test_training_predicts_what_use_predicts(examples, kind):
     """One frame from the truth with the same random weights: the places of all joints."""
     trained = problem(examples, {"kind": kind})
     params = jax.tree.map(lambda a: 3.0 * a, trained.first(jax.random.key(5)))
-    model = ThrowModel(
-        trained.settings, examples[0].motion.skeleton,
-        {name: to_use(params[name], trained.scales[name]) for name in params}, leg_reach(examples), tuple(examples),
-    )
+    model = ThrowModel(settings=trained.settings, skeleton=examples[0].motion.skeleton,
+                       networks={name: to_use(params[name], trained.scales[name]) for name in params},
+                       leg_reach=leg_reach(examples), examples=tuple(examples))
     pose, _, window = steps(examples[0])
     at = lambda part, frame: type(part)(*(one[frame] for one in part))  # noqa: E731
     mine, _ = Stepper(model).predicted(at(pose, 7), at(window, 7), bounded=False)

@@ -29,7 +29,7 @@ def coarse_courses(
         flies, stays = np.flatnonzero(~lies), np.flatnonzero(lies)
         if len(flies):
             place[flies], velocity[flies], spin[flies], lies[flies] = _in_air(
-                place[flies], velocity[flies], spin[flies], ball, step, low)  # fmt: skip
+                place[flies], velocity[flies], spin[flies], ball=ball, step=step, low=low)  # fmt: skip
         if len(stays):
             rolling = _on_ground(place[stays], velocity[stays], spin[stays], ball, step)
             place[stays], velocity[stays], spin[stays] = rolling

@@ -13,7 +13,7 @@ GOAL_HEIGHT = 2.44  # m
 _BACK = 0.5  # s in the field before it can go out again
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BallEnd:
     """The whole ball over a line: time s; kind "goal", "goal line" or "touch line"; x, y m; player: who touched it last
     ("" unknown)."""
@@ -40,7 +40,7 @@ def ball_ends(times: np.ndarray, ball: np.ndarray, length: float, width: float) 
             continue
         place = ball[index - 1] + share * (ball[index] - ball[index - 1])
         kind = "touch line" if over_side[index] >= over_end[index] else _by_goal(place)
-        found.append(BallEnd(time, kind, float(place[0]), float(place[1])))
+        found.append(BallEnd(time=time, kind=kind, x=float(place[0]), y=float(place[1])))
     return found
 
 

@@ -92,7 +92,8 @@ def gathered(times, positions, measured, used, spans) -> Stretches:
     weight_z = np.where(measured[index], 1.0 / _SEEN_HEIGHT, 1.0 / _FILLED) * (inside & used[index] & high)
     start, end, velocity = (np.array([span[place] for span in spans]) for place in (2, 3, 4))
     since = np.where(inside, times[index] - begins[:, None], 0.0)
-    return Stretches(ends - begins, start, end, velocity, since, np.nan_to_num(points), weight, weight_z)
+    return Stretches(ends - begins, start, end, velocity=velocity, since=since, points=np.nan_to_num(points),
+                     weight=weight, weight_z=weight_z)
 
 
 def fit_launches(
@@ -103,12 +104,12 @@ def fit_launches(
         tried = [_guess(stretches, stretches.velocity[:, 2])]
     else:
         tried = _lofted(stretches, ball, cancelled)
-    fitted = [_fitted(stretches, start, ball, _ROUNDS, _coarsely, cancelled) for start in tried]
+    fitted = [_fitted(stretches, start, ball, rounds=_ROUNDS, follow=_coarsely, cancelled=cancelled) for start in tried]
     best, cost = fitted[0]
     for other, costs in fitted[1:]:
         clearly = costs < _CLEARLY * cost - _MARGIN  # where it cannot be told, the lower one
         best, cost = np.where(clearly[:, None], other, best), np.where(clearly, costs, cost)
-    best, cost = _fitted(stretches, best, ball, _FINE_ROUNDS, _finely, cancelled)
+    best, cost = _fitted(stretches, best, ball, rounds=_FINE_ROUNDS, follow=_finely, cancelled=cancelled)
     return Launches(*_launch(stretches, best, ball), cost)
 
 
@@ -121,7 +122,8 @@ def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
         return [start]
     some = stretches.take(far)
     most = 0.5 * ball.gravity * some.seconds + 2.0  # it has come down again by then
-    rough = [_fitted(some, _guess(some, np.minimum(upward, most)), ball, _ROUGH_ROUNDS, _coarsely, cancelled)
+    rough = [_fitted(some, _guess(some, np.minimum(upward, most)), ball, rounds=_ROUGH_ROUNDS, follow=_coarsely,
+                     cancelled=cancelled)
              for upward in _UPWARD]  # fmt: skip
     costs, found = np.array([cost for _, cost in rough]), np.stack([unknown for unknown, _ in rough])
     low = np.argmin(costs[:_LOW_ONES], axis=0)
@@ -133,7 +135,7 @@ def _lofted(stretches: Stretches, ball: Ball, cancelled) -> list[np.ndarray]:
 
 
 def _coarsely(place, velocity, spin, ball: Ball, count: int):
-    return coarse_courses(place, velocity, spin, ball, GRID, count)
+    return coarse_courses(place, velocity, spin, ball=ball, step=GRID, count=count)
 
 
 def _finely(place, velocity, spin, ball: Ball, count: int):

@@ -147,8 +147,9 @@ def _piece(grid, places, speeds, span, spin) -> BallPiece:
     times = np.append(grid[inside], seconds)
     places, speeds = np.vstack([places[inside], end]), np.vstack([speeds[inside], end_speed])
     high = places[:, 2].max() - FOOTBALL.radius
-    return BallPiece(span[0] + times, places, speeds, "flight" if high > _AIR else "roll", spin, np.nan,
-                     span[0] + _bounces(times, places, speeds))  # fmt: skip
+    return BallPiece(times=span[0] + times, positions=places, velocities=speeds,
+                     kind="flight" if high > _AIR else "roll", spin=spin, residual=np.nan,
+                     bounces=span[0] + _bounces(times, places, speeds))  # fmt: skip
 
 
 def _bounces(times, places, speeds) -> np.ndarray:
@@ -214,7 +215,8 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
     path = interpolate(since, piece.times - piece.start, places[:, :2])
     residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
-    return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, residual, piece.bounces)
+    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
+                     residual=residual, bounces=piece.bounces)
 
 
 def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
@@ -234,7 +236,8 @@ def _falling(piece: BallPiece, height: float) -> BallPiece:
     higher = falls > piece.positions[:, 2]
     places, speeds = piece.positions.copy(), piece.velocities.copy()
     places[higher, 2], speeds[higher, 2] = falls[higher], -FOOTBALL.gravity * since[higher]
-    return BallPiece(piece.times, places, speeds, piece.kind, piece.spin, piece.residual, piece.bounces)
+    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
+                     residual=piece.residual, bounces=piece.bounces)
 
 
 def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

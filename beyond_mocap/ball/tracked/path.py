@@ -11,7 +11,7 @@ from ...base.easing import hermite
 from ...motion.skeleton import frozen_array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class BallPiece:
     """The ball between two changes of its course.
 

@@ -83,7 +83,7 @@ def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts
         counts = end - starts
         begin = np.repeat(starts, counts)
         upto = begin + 1 + np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-        parts.append(_solve(times, points, weights, cuts, begin, upto))
+        parts.append(_solve(times, points, weights, cuts=cuts, begin=begin, upto=upto))
     names = Fits.__dataclass_fields__
     return Fits(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
@@ -116,4 +116,5 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
     inverse = np.linalg.inv(normal)
     found = inverse @ right
     cost = 0.5 * (square[row, column] - (found * right).sum(axis=(1, 2)))
-    return Fits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], found, np.maximum(cost, 0.0), inverse)
+    return Fits(cuts[begin], cuts[upto] - 1, times[cuts[begin]], coefficients=found, cost=np.maximum(cost, 0.0),
+                inverse=inverse)

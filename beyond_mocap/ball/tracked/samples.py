@@ -21,7 +21,7 @@ _MEDIAN_LENGTH = 1.177  # of vectors of two normal values
 _LOW = 0.3  # m, of a ball on the ground
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Samples:
     """N samples of the ball.
 
@@ -73,9 +73,8 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     scatter = _scatter(ball[:, :2], interval)
     outlier = _outliers(times, ball[:, :2], known, scatter)
     known, filled, outlier = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
-    return Samples(
-        frozen_array(times), frozen_array(_centred(ball)), known, filled, outlier, frozen_array(scatter), interval
-    )
+    return Samples(times=frozen_array(times), positions=frozen_array(_centred(ball)), known=known, filled=filled,
+                   outlier=outlier, scatter=frozen_array(scatter), interval=interval)
 
 
 def _centred(ball: np.ndarray) -> np.ndarray:

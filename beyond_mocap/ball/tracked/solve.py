@@ -37,7 +37,7 @@ _EVERYBODY = 14  # players who are tracked: a touch by nobody among so many is a
 _HEIGHTS = 0.8  # share of samples with a height from which heights are used
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SolvedTouch:
     """Somebody changed the ball's course.
 
@@ -61,7 +61,7 @@ class SolvedTouch:
             object.__setattr__(self, name, frozen_array(getattr(self, name)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SolvedBall:
     """What was solved from N samples.
 
@@ -114,7 +114,7 @@ def solve(
         if progress is not None:
             progress(0.6 * number / len(windows), "touches")
         found.append(_solve_window(samples, window, positions, stranger))
-    solved = _named(samples, found, positions, players, teams, pitch, stranger)
+    solved = _named(samples, found, positions, players=players, teams=teams, pitch=pitch, stranger=stranger)
     curves = [piece for window, cuts in zip(windows, found) for piece in _pieces(samples, window, cuts)]
     if progress is not None:
         progress(0.6, "flights")
@@ -212,12 +212,14 @@ def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
     seen = samples.measured[part]
-    piece = SolvedPath((BallPiece(at, places, speeds, "", np.zeros(3), np.nan, np.zeros(0)),))
+    piece = SolvedPath((BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3),
+                                  residual=np.nan, bounces=np.zeros(0)),))
     off = piece.residuals(samples.times[part], samples.positions[part])[seen]
     fast, high = np.linalg.norm(speeds[:, :2], axis=1).max(), places[:, 2].max()
     kind = "flight" if high > 0.5 else "still" if fast < 0.3 else "roll"
     residual = float(np.sqrt(np.mean(off**2))) if len(off) else np.nan
-    return BallPiece(at, places, speeds, kind, np.zeros(3), residual, np.zeros(0))
+    return BallPiece(times=at, positions=places, velocities=speeds, kind=kind, spin=np.zeros(3), residual=residual,
+                     bounces=np.zeros(0))
 
 
 def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
@@ -252,7 +254,8 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
         sure = _sure(margin[k], away[:, k], player)
         centre = np.array([place[k, 0], place[k, 1], kinds.ground_height(place[k, 2])])
         name = players[player] if player >= 0 else ""
-        out.append(SolvedTouch(float(time[k]), float(spread[k]), name, part, kind, centre, before[k], after[k], sure))
+        out.append(SolvedTouch(time=float(time[k]), uncertainty=float(spread[k]), player=name, part=part, kind=kind,
+                               position=centre, before=before[k], after=after[k], confidence=sure))
     return out
 
 
@@ -343,4 +346,4 @@ def _sure(margin: float, away: np.ndarray, player: int) -> float:
 
 def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
     earlier = [touch.player for touch in solved if touch.time < end.time]
-    return BallEnd(end.time, end.kind, end.x, end.y, earlier[-1] if earlier else "")
+    return BallEnd(time=end.time, kind=end.kind, x=end.x, y=end.y, player=earlier[-1] if earlier else "")

@@ -26,7 +26,7 @@ _SKIPPED = 40.0  # nats for a second left out so
 _SHORT, _SHORT_PRICE = 0.24, 6.0  # s within which the course hardly changes twice, nats for twice at once
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Cuts:
     """The cuts that remain, in order, C of them, and the C + 1 pieces around them.
 
@@ -49,7 +49,7 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
 
     player_cost: (len(cuts),) nats for the nearest player being the one who touches there.
     """
-    pieces = fit_between(times, points, weights, cuts, _LONGEST, _STEPS)
+    pieces = fit_between(times, points, weights, cuts=cuts, longest=_LONGEST, steps=_STEPS)
     begin = np.searchsorted(cuts, pieces.first)
     upto = np.searchsorted(cuts, pieces.last + 1)
     by_begin = np.searchsorted(begin, np.arange(len(cuts) + 1))
@@ -59,7 +59,7 @@ def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     reach = np.clip(np.maximum(reach, np.arange(len(cuts) - 1)), 0, len(cuts) - 2)
     outof = [(by_begin[cut], by_begin[reach[cut] + 1]) for cut in range(len(cuts) - 1)]
     left, right = _pairs(ending, by_end, outof)
-    knot = _knots(pieces, left, right, times, cuts, upto, begin, player_cost)
+    knot = _knots(pieces, left, right, times=times, cuts=cuts, upto=upto, begin=begin, player_cost=player_cost)
     price = np.minimum(knot.touch, knot.free)
     own = pieces.cost + _short(pieces, times)
     best = np.where(begin == 0, own, np.inf)
@@ -99,7 +99,7 @@ def _pairs(ending, by_end, outof) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(left), np.concatenate(right)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Knots:
     time: np.ndarray
     spread: np.ndarray
@@ -137,7 +137,8 @@ def _knots(pieces: Fits, left, right, times, cuts, upto, begin, player_cost) -> 
     free = FREE + _NEAR * np.exp(-near) + joint + _free_cost(before, change, here, speed_var)
     place = (here * place_right[:, None] + there * place_left[:, None]) / (place_left + place_right)[:, None]
     spread = np.sqrt((place_left + place_right) / np.maximum(size**2, 0.25) + (0.1 * step) ** 2)
-    return _Knots(time, np.minimum(spread, step), place, before, after, touch, free)
+    return _Knots(time=time, spread=np.minimum(spread, step), place=place, before=before, after=after, touch=touch,
+                  free=free)
 
 
 def _usual(times: np.ndarray) -> float:
@@ -177,7 +178,8 @@ def _heavy(squares: np.ndarray) -> np.ndarray:
 def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
     upto = np.searchsorted(cuts, pieces.last + 1)
     left = np.arange(len(pieces) - 1)
-    knots = _knots(pieces, left, left + 1, times, cuts, upto, np.searchsorted(cuts, pieces.first), player_cost)
+    knots = _knots(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
+                   player_cost=player_cost)
     return Cuts(
         time=knots.time, spread=knots.spread, touch=knots.touch < knots.free,
         margin=np.abs(knots.touch - knots.free), place=knots.place, before=knots.before, after=knots.after,

@@ -156,7 +156,8 @@ def _folded(channels: _Channels, hips: int) -> tuple[np.ndarray, np.ndarray, tup
         moves = _strays(place) > _STILL_METRES or np.abs(turn @ turn[0]).min() < _STILL_ROTATION
         carries = fixed if joint == parents[hips] else None
         name, its = channels.text.names[joint], channels.text.channels[joint]
-        above.insert(0, RootAbove(name, its, bool(moves), place[0], turn[0], carries=carries))
+        above.insert(0, RootAbove(name=name, channels=its, moves=bool(moves), position=place[0], rotation=turn[0],
+                                  carries=carries))
         joint = parents[joint]
     return position, rotation, tuple(above)
 

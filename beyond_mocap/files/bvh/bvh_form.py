@@ -8,7 +8,7 @@ from typing import Mapping
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class RootAbove:
     """A joint that stood above the hips, from the file's root down.
 

@@ -26,7 +26,7 @@ _EXPORT_AGAIN = "export the file again"
 _DAMAGED = f"the file is cut off or damaged; {_EXPORT_AGAIN}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class BvhText:
     """A file's content. J joints, parents before children; file units, file axes, degrees.
 
@@ -130,17 +130,17 @@ class _Hierarchy:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
-            self.path,
-            tuple(self.names),
-            tuple(self.parents),
-            np.array(self.offsets),
-            tuple(self.channels),
-            tuple(joint for joint, _ in ends),
-            np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time,
-            values,
-            first_row,
-            tuple(self.renamed),
+            path=self.path,
+            names=tuple(self.names),
+            parents=tuple(self.parents),
+            offsets=np.array(self.offsets),
+            channels=tuple(self.channels),
+            end_parents=tuple(joint for joint, _ in ends),
+            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3),
+            frame_time=frame_time,
+            values=values,
+            first_row=first_row,
+            renamed=tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:
@@ -231,12 +231,13 @@ def _number(word: str) -> float | None:
 
 def _motion_head(path: Path, data: bytes, start: int, line: int) -> tuple[int, float, int, int]:
     """Frames, seconds per frame, where the rows start (byte, line) from the two lines after MOTION."""
-    frames_text, start, line = _labelled(path, data, start, line, rb"Frames\s*:", "Frames: and how many")
+    frames_text, start, line = _labelled(path, data, start, line=line, label=rb"Frames\s*:",
+                                         expected="Frames: and how many")
     frames = int(frames_text) if re.fullmatch(r"\d{1,12}", frames_text) else 0
     if frames < 1:
         raise InputError(f"{path}:{line - 1}", f"Frames: {frames_text[:40]}", "a whole number above 0", _EXPORT_AGAIN)
     expected = "Frame Time: and seconds per frame"
-    time_text, start, line = _labelled(path, data, start, line, rb"Frame\s*Time\s*:", expected)
+    time_text, start, line = _labelled(path, data, start, line=line, label=rb"Frame\s*Time\s*:", expected=expected)
     frame_time = _number(time_text)
     if frame_time is None or not 1e-5 <= frame_time <= 1e3:
         raise InputError(

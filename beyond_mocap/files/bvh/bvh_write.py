@@ -20,7 +20,7 @@ _SAME_PLACE = 1e-4  # centimetres
 _SAME_ANGLE = np.degrees(1e-6)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Joint:
     """A joint as it is to stand in the file, centimetres and degrees, Y up.
 
@@ -47,7 +47,7 @@ def document(motion: Motion, form: BvhForm) -> tuple[Iterator[str], tuple[str, .
         place = root if i == 0 else motion.skeleton.offsets[i][None]
         ends = motion.skeleton.end_offsets[[p == i for p in motion.skeleton.end_parents]]
         turn = rotation if i == 0 else motion.rotations[:, i]
-        joints.append(_joint(name, len(form.above) + depth, declared, place, turn, ends))
+        joints.append(_joint(name, len(form.above) + depth, declared, place=place, turn=turn, ends=ends))
     notes = tuple(f"{j.name}: {', '.join(j.added)} added, the motion needs it" for j in joints if j.added)
     return _text(joints, motion.fps), notes
 
@@ -92,7 +92,8 @@ def _joint(name: str, depth: int, declared: tuple[str, ...], place: np.ndarray, 
     ]
     offset = places[0] if len(places) == 1 else np.where([c in channels for c in POSITIONS], 0.0, places[0])
     columns = np.stack(columns, axis=1) if columns else np.zeros((frames, 0))
-    return _Joint(name, depth, offset, channels, columns, _to_file(ends), tuple(lacking))
+    return _Joint(name=name, depth=depth, offset=offset, channels=channels, columns=columns, ends=_to_file(ends),
+                  added=tuple(lacking))
 
 
 def _depth_first(skeleton: Skeleton) -> Iterator[tuple[int, int]]:
@@ -141,7 +142,7 @@ def _above(motion: Motion, above: tuple[RootAbove, ...]) -> list[_Joint]:
     for depth, (joint, parent, world) in enumerate(zip(above, worlds, worlds[1:])):
         place, turn = _relative(world, parent)
         place = place if joint.moves else joint.position[None]
-        out.append(_joint(joint.name, depth, joint.channels, place, turn, np.zeros((0, 3))))
+        out.append(_joint(joint.name, depth, joint.channels, place=place, turn=turn, ends=np.zeros((0, 3))))
     return out
 
 

@@ -13,7 +13,7 @@ CERTAIN = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain"
 """Kinds that are a touch for certain."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class MatchEvent:
     """Somebody did something.
 

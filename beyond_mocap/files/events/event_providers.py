@@ -71,7 +71,8 @@ def load_events(path: Path, provider: EventProvider, meta: Path | None):
     known = {"events": str(path), "meta": str(meta)}
     arguments = {key: known[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""
-    return load_through_kloppy(path, provider.name, provider.loader, arguments, f"{provider.name} events", others)
+    return load_through_kloppy(path, provider.name, provider.loader, arguments=arguments,
+                               form=f"{provider.name} events", others=others)
 
 
 _XML = rb"(?s)\s*(<\?xml[^>]*>\s*)?"

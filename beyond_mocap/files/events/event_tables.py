@@ -52,7 +52,8 @@ def read_plain_events(path: Path, match: Match | None):
         details = ("throw-in",) if "throw in" in f"{said} {words}".replace("-", " ") else ()
         xy = tuple(number(row.get(name, ""), name, place, blank=True) for name in ("x", "y"))
         success = {"true": True, "1": True, "false": False, "0": False}.get(row.get("success", "").lower())
-        event = MatchEvent(time, period, "", "", kind, "hand" if details else part, side, details, said, success, xy)
+        event = MatchEvent(time=time, period=period, player="", team="", kind=kind, part="hand" if details else part,
+                           side=side, details=details, said=said, success=success, place=xy)
         rows.append((event, Who.spelled(row["player"]) if row["player"] else None))
     return rows
 
@@ -81,8 +82,7 @@ def read_metrica_events(path: Path, match: Match | None):
         details = ("throw-in",) * (part == "hand") + ("lost",) * (kind == "aerial" and "lost" in said)
         x, y = (number(row[name], name, place, blank=True) for name in ("Start X", "Start Y"))
         team = row["Team"].lower() if row["Team"].lower() in ("home", "away") else ""
-        event = MatchEvent(
-            time, period, "", team, kind, part, "", details, said, None, ((x - 0.5) * length, (0.5 - y) * width),
-        )
+        event = MatchEvent(time=time, period=period, player="", team=team, kind=kind, part=part, side="",
+                           details=details, said=said, success=None, place=((x - 0.5) * length, (0.5 - y) * width))
         rows.append((event, Who.spelled(row["From"], team) if row["From"] else None))
     return rows

@@ -83,10 +83,9 @@ def _through_kloppy(path: Path, provider: EventProvider, second: Path | None, ma
     for record in dataset.records:
         kind, part, side, details, success = kind_of(record, provider.tells_foot)
         team = str(record.team.ground) if record.team else ""
-        event = MatchEvent(
-            record.timestamp.total_seconds(), int(record.period.id), "", team, kind, part, side, details,
-            str(record.event_name), success, place(record, team),
-        )
+        event = MatchEvent(time=record.timestamp.total_seconds(), period=int(record.period.id), player="", team=team,
+                           kind=kind, part=part, side=side, details=details, said=str(record.event_name),
+                           success=success, place=place(record, team))
         rows.append((event, _who(record)))
     return rows
 

@@ -42,7 +42,8 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
     arguments["coordinates"] = record.coordinates or record.name
     others = f" and its metadata {', '.join(one.name for one in feed.meta) or feed.tracking[-1].name}"
     loader = record.team_loader if feed.by_teams else record.loader
-    return load_through_kloppy(feed.path, record.name, loader, arguments, f"{record.name} tracking", others)
+    return load_through_kloppy(feed.path, record.name, loader, arguments=arguments, form=f"{record.name} tracking",
+                               others=others)
 
 
 def _check_file(path: str | os.PathLike) -> Path:

@@ -22,7 +22,7 @@ _NOTHING = 0.01  # seconds: leads that are shorter are how somebody sets keys
 _AROUND = 0.12  # seconds around a candidate in which its strike is looked for
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Act:
     """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
     its confidence (`confidence.sure`). silent: what counts as the rules' confidence where they say nothing. shown: by

@@ -67,7 +67,7 @@ def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
     at, score = candidates(act.kernel, rows, seconds, told, act.word)
     sure = confidence.sure(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
     likely = [(sample, float(how)) for sample, how in zip(at, sure) if how >= LEAST]
-    return [_moment(act, seen, rows, seconds, told, sample, how) for sample, how in likely]
+    return [_moment(act, seen, rows, seconds=seconds, told=told, sample=sample, sure=how) for sample, how in likely]
 
 
 def _moment(act: Act, seen: Signals, rows, seconds, told, sample: int, sure: float) -> Proposal:

@@ -100,9 +100,10 @@ def _act(number: int, header: dict, arrays: dict, components: int) -> Act:
     if len(by_rule) != len(choices) or not -1 <= strike < len(STRIKES) or not all(choices):
         raise ValueError("header")
     before, after = (_number(header[name], least=0.0) for name in ("before", "after"))
-    return Act(_word(header["word"]), bool(header["moment"]), kernel, _array(arrays, f"{number}.sure", (3,)),
-               _number(header["silent"]), _number(header["shown"]), strike, _number(header["lead"]), before, after,
-               Details(choices, planes, by_rule))
+    return Act(word=_word(header["word"]), moment=bool(header["moment"]), kernel=kernel,
+               weights=_array(arrays, f"{number}.sure", (3,)), silent=_number(header["silent"]),
+               shown=_number(header["shown"]), strike=strike, lead=_number(header["lead"]), before=before, after=after,
+               details=Details(choices, planes, by_rule))
 
 
 def _array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:

@@ -30,7 +30,7 @@ STRIKES = ("foot", "hand", "head", "pelvis up", "pelvis down")
 faster hand's speed, the head's forward against the chest, the pelvis's height and its negative."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Signals:
     """What a recording shows.
 
@@ -78,9 +78,9 @@ def signals(motion: Motion) -> Signals:
     sides = [_points_of(body, limb) for limb in (body.left, body.right)]
     head = body.head_or_neck
     strikes = _strikes(places, moving, body, head, facing)
-    return Signals(motion.fps, len(motion), at, points([body.chest, head]),
-                   np.stack([points(one) for one in sides], axis=1),
-                   _trunk(motion, body, places, moving, facing, leg)[rows], strikes)
+    return Signals(fps=motion.fps, count=len(motion), frames=at, middle=points([body.chest, head]),
+                   paired=np.stack([points(one) for one in sides], axis=1),
+                   trunk=_trunk(motion, body, places, moving=moving, facing=facing, leg=leg)[rows], strikes=strikes)
 
 
 def _points_of(body: Humanoid, limb) -> list[int]:

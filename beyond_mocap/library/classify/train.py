@@ -28,7 +28,7 @@ _EVERY = 5  # samples between two of a stretch that count for its confidence and
 _WINDOWS = 60000  # that the space is made from at most: half a gigabyte
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Side:
     """A clip or its mirrored twin. example: the clip; rows (N, K): its windows; seconds (N,); said: its rows' words in
     `example.rows`' order; ruled: what the rules say, in seconds; twin: whether it is mirrored."""
@@ -101,8 +101,9 @@ def _twins(example: Example, space: Space) -> list[_Side]:
     ruled, fps = in_seconds(example.ruled, example.signals.fps), example.seconds()
     other = in_seconds(example.ruled, example.signals.fps, mirrored=True)
     return [
-        _Side(example, in_space(example.signals, space), fps, words, ruled, False),
-        _Side(example, in_space(example.signals.mirrored, space), fps, tuple(map(swap_sides, words)), other, True),
+        _Side(example=example, rows=in_space(example.signals, space), seconds=fps, said=words, ruled=ruled, twin=False),
+        _Side(example=example, rows=in_space(example.signals.mirrored, space), seconds=fps,
+              said=tuple(map(swap_sides, words)), ruled=other, twin=True),
     ]
 
 
@@ -123,7 +124,8 @@ def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
         before = float(np.median([(row.key - row.start) / one.signals.fps for one, row in keys]))
         after = float(np.median([(row.end - row.key) / one.signals.fps for one, row in keys]))
     times = _acts([side.example for side in sides if not side.twin])[word, moment]
-    return Act(word, moment, looks, weights, silent, times, strike, lead, before, after, beside)
+    return Act(word=word, moment=moment, kernel=looks, weights=weights, silent=silent, shown=times, strike=strike,
+               lead=lead, before=before, after=after, details=beside)
 
 
 def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:

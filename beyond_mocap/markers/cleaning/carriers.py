@@ -27,7 +27,7 @@ _FAR = 0.02
 _DEFORMED, _TIMES_USUAL = 0.012, 3.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Carried:
     """One marker seen from its helpers, over T frames.
 
@@ -111,7 +111,8 @@ def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: S
     """How these helpers carry this marker over the frames of positions (T, M, 3) m; `shape`: theirs, where known."""
     frames = len(positions)
     nothing = np.full((frames, 3), np.nan)
-    alone = Carried((), None, None, np.zeros(frames, dtype=bool), nothing, np.full(3, np.nan), np.inf)
+    alone = Carried(helpers=(), shape=None, fit=None, trusted=np.zeros(frames, dtype=bool), local=nothing,
+                    place=np.full(3, np.nan), sigma=np.inf)
     if len(helpers) < 3:
         return alone
     seen = positions[:, list(helpers)]
@@ -124,7 +125,7 @@ def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: S
         return alone
     place = np.median(local[there], axis=0)
     sigma = 1.4826 * median(np.linalg.norm(local - place, axis=-1))
-    return Carried(tuple(helpers), shape, fit, trusted, local, place, sigma)
+    return Carried(helpers=tuple(helpers), shape=shape, fit=fit, trusted=trusted, local=local, place=place, sigma=sigma)
 
 
 def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int = _MOST_HELPERS) -> tuple[int, ...]:

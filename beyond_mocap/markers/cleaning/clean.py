@@ -29,7 +29,7 @@ _STRAYED, _FOR = 1.5, 0.1
 _NEAR_BREAK = 3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CleanSettings:
     """What the clean-up does. longest_gap, longest_soft_gap, longest_spline: seconds up to which a gap is filled by
     markers that carry the missing one firmly, softly, and by a curve alone; 0 fills none that way."""
@@ -88,7 +88,7 @@ class _Work:
     def look_again(self, changed: Sequence[int]):
         """See it anew where a few samples of these markers have changed."""
         named = [i for i in self.carried if self.seen(i)]
-        self.carried = carriers(self.positions, self.soft, named, self.carried, changed, self.ask)
+        self.carried = carriers(self.positions, self.soft, named, known=self.carried, changed=changed, ask=self.ask)
 
     def seen(self, marker):
         return np.isfinite(self.positions[:, marker, 0]).any()
@@ -97,7 +97,8 @@ class _Work:
         """The stretch of these markers' frames, in seconds."""
         clock = self.trial.start + np.array([first, end - 1]) / self.trial.fps
         names = tuple(self.trial.labels[i] for i in labels)
-        return Stretch(names, float(clock[0]), float(clock[1]), frames or end - first, how, float(off))
+        return Stretch(labels=names, start=float(clock[0]), end=float(clock[1]), frames=frames or end - first, how=how,
+                       off=float(off))
 
 
 def clean(
@@ -146,7 +147,8 @@ def _swaps(work):
     work.positions, found = there_and_back(work.positions, work.carried)
     _note_swaps(work, found)
     leaping = leaps(work.positions, work.carried, work.trial.fps)
-    work.positions, found = mend(work.positions, work.carried, leaping, work.trial.fps, _opposite(work), work.ask)
+    work.positions, found = mend(work.positions, work.carried, leaping, fps=work.trial.fps, opposite=_opposite(work),
+                                 ask=work.ask)
     _note_swaps(work, found)
 
 
@@ -192,7 +194,7 @@ def _names(work):
 def _gaps(work, settings):
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
-    filled, found = fill(work.positions, work.soft, work.trial.fps, longest, work.carried, work.ask)
+    filled, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried, ask=work.ask)
     work.positions = filled
     for name, kept in (("gaps", True), ("left", False)):
         work.found[name] = tuple(

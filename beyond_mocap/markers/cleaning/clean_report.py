@@ -11,7 +11,7 @@ from ...base.errors import TimedLine
 _MOST_LINES = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Stretch:
     """Something that was found between two moments.
 
@@ -31,7 +31,7 @@ class Stretch:
         return f"at {self.start:.3f} s" if self.frames == 1 else f"{self.start:.3f} to {self.end:.3f} s"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class CleanReport:
     """What was found and done.
 

@@ -151,7 +151,7 @@ def _parsed(path: Path, section: bytes):
 # -- the samples
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Layout:
     """Where the samples lie. data: byte of the first. points, analog: values of a frame (a point has four). scale: as
     the file has it; negative where samples are floats. notes: where header and parameters disagree."""
@@ -192,7 +192,7 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
         raise InputError(path, f"{header.point_count} markers, {max(counts['frames'], default=0)} frames", "markers",
                          "export the trial with its markers")  # fmt: skip
     layouts = [
-        _Layout(data, points, analog, count, scale, first, ())
+        _Layout(data=data, points=points, analog=analog, frames=count, scale=scale, first_frame=first, notes=())
         for data, points, analog, count in itertools.product(*counts.values()) if points
     ]
     left = [size - layout.data - layout.frames * layout.stride for layout in layouts]
@@ -205,7 +205,8 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
     chosen = layouts[fitting[0]]
     notes = [f"header and parameters disagree on {name}: {getattr(chosen, name)} fits the file"
              for name, said in counts.items() if len(said) > 1]  # fmt: skip
-    return _Layout(chosen.data, chosen.points, chosen.analog, chosen.frames, scale, first, tuple(notes))
+    return _Layout(data=chosen.data, points=chosen.points, analog=chosen.analog, frames=chosen.frames, scale=scale,
+                   first_frame=first, notes=tuple(notes))
 
 
 def _one_of(*values: float) -> float:

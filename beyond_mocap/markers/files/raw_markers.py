@@ -24,7 +24,7 @@ _UP = {
 """What points up in the file, (axis, sign) -> which of its axes ours are, and their signs: turned, never mirrored."""
 
 
-@dataclass
+@dataclass(kw_only=True)
 class RawMarkers:
     """What a reader found. T frames, M points, the file's unit and axes.
 

@@ -61,7 +61,7 @@ def _lines(path: Path) -> list[str]:
 # -- head
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Head:
     """What stands above the rows. columns: (M, 3) of the cells with X, Y and Z; first_row: index of the line where the
     rows begin; values: of the head, by their names in small letters; tabs: whether they part the cells."""
@@ -95,7 +95,8 @@ def _head(path: Path, lines: list[str]) -> _Head:
     named = _cells(lines[at], tabs)
     labels, starts = _labels(path, named, at, tabs)
     if below is not None:
-        labels, starts, order = _by_coordinates(path, _cells(lines[below], tabs), below, labels, starts, tabs)
+        labels, starts, order = _by_coordinates(path, _cells(lines[below], tabs), below, labels=labels, starts=starts,
+                                                tabs=tabs)
     else:
         order = (0, 1, 2)
     if not labels:
@@ -105,7 +106,8 @@ def _head(path: Path, lines: list[str]) -> _Head:
     if said.isdigit() and int(said) != len(labels):
         notes.append(f"{len(labels)} markers, not the {said} of the head")
     columns = np.array(starts)[:, None] + np.array(order)
-    return _Head(labels, columns, (at if below is None else below) + 1, values, tabs, notes)
+    return _Head(labels=labels, columns=columns, first_row=(at if below is None else below) + 1, values=values,
+                 tabs=tabs, notes=notes)
 
 
 def _first(line: str) -> str:

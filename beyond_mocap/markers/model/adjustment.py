@@ -27,7 +27,7 @@ _CARRY, _TWIST = np.radians(4.0), np.radians(15.0)
 """How far a hinge's axis strays (radians): to the side, and about the limb (knees)."""
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Body:
     """What is adjusted, J joints and M markers.
 
@@ -44,7 +44,7 @@ class Body:
     limb: np.ndarray
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class Prior:
     """What was known before: offsets (J, 3) m with sigma (J,), places (M, 3) m with sigma (M,), and by how much the
     bones of both sides may differ (m)."""

@@ -38,7 +38,7 @@ def model_from_frame(
     """
     centres = predict(landmark_places(frame, marker_set), standing)
     carried = {label: marker_set.segment_of(label) for label in frame if np.isfinite(frame[label]).all()}
-    return model_from_centres(centres, frame, carried, marker_set, subject, session)
+    return model_from_centres(centres, frame, carried, marker_set=marker_set, subject=subject, session=session)
 
 
 def model_from_centres(

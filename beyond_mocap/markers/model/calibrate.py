@@ -76,7 +76,7 @@ def with_late_markers(
     shown = trial.seen[:, [trial.index(label) for label in late]].sum(axis=1)
     frames = np.sort(np.argsort(-shown, kind="stable")[: 4 * _FRAMES])
     frames = frames[np.unique(np.linspace(0, len(frames) - 1, _FRAMES).astype(int))]
-    part = MarkerTrial(trial.labels, trial.positions[frames], 1.0, name=trial.name)
+    part = MarkerTrial(labels=trial.labels, positions=trial.positions[frames], fps=1.0, name=trial.name)
     motion = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled).motion
     joints, turns = forward_kinematics(motion)
     places, carriers, found = [], [], []
@@ -253,7 +253,8 @@ def refined(
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
     body = _body(model)
-    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen_markers(model, part), _sigmas(model), worth)
+    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen=seen_markers(model, part),
+                      sigma=_sigmas(model), worth=worth)
     task.start(motion)
     for _ in range(2):
         if cancelled():
@@ -279,7 +280,7 @@ def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, 
     if static is not None:
         still = seen_markers(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
         positions = np.concatenate([still, positions])
-    return MarkerTrial(model.markers, positions, 1.0, name=trial.name)
+    return MarkerTrial(labels=model.markers, positions=positions, fps=1.0, name=trial.name)
 
 
 def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
@@ -302,9 +303,8 @@ def _body(model: MarkerModel) -> Body:
     names = model.skeleton.names
     limb = np.array([_LIMBS.get(_part(name), -1) for name in names])
     held = ~model.freedom.free.any(axis=1)
-    return Body(
-        names, model.skeleton.parents, model.skeleton.offsets.copy(), model.joint, model.places.copy(), held, limb
-    )
+    return Body(names=names, parents=model.skeleton.parents, offsets=model.skeleton.offsets.copy(), joint=model.joint,
+                places=model.places.copy(), held=held, limb=limb)
 
 
 def _prior(model: MarkerModel, place_sigma: float) -> Prior:
@@ -313,7 +313,8 @@ def _prior(model: MarkerModel, place_sigma: float) -> Prior:
     places = np.full(len(model.joint), place_sigma)
     held = ~model.freedom.free.any(axis=1)
     offsets = np.where(held, _UNTOLD, np.sqrt(sigma**2 + above**2))
-    return Prior(model.skeleton.offsets.copy(), offsets, model.places.copy(), places)
+    return Prior(offsets=model.skeleton.offsets.copy(), offset_sigma=offsets, places=model.places.copy(),
+                 place_sigma=places)
 
 
 def _pull(model: MarkerModel) -> Pull:

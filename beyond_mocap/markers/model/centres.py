@@ -32,7 +32,7 @@ _STRAIGHT = 0.14  # sine of the angle of an elbow (8 degrees) below which its pl
 _UPRIGHT = 0.35  # radians between the trunk and the vertical that still count as standing
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Centres:
     """What one frame tells about a body.
 
@@ -61,7 +61,7 @@ def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
     cannot be told.
     """
     points = {name: np.asarray(place, dtype=float) for name, place in points.items() if np.isfinite(place).all()}
-    out = Centres(body_size(points))
+    out = Centres(size=body_size(points))
     _pelvis(out, points)
     if any(LANDMARK_PLACES[name][0] == "Chest" for name in points):
         _thorax(out, points)
@@ -228,11 +228,11 @@ def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarra
 def _leg(out: Centres, points: Mapping[str, np.ndarray], side: str, standing: bool) -> None:
     name, sign = side.capitalize(), 1.0 if side == "left" else -1.0
     hip = out.places[f"{name}UpLeg"]
-    knee = _hinge(out, points, side, "knee", hip, _knee_outwards(out, points, side, sign, standing))
+    knee = _hinge(out, points, side, joint="knee", above=hip, hint=_knee_outwards(out, points, side, sign, standing))
     if knee is None:
         raise InputError(f"{side} leg", "no marker on the knee", f"{side}_knee_lateral",
                          "name the leg's markers in the marker set")
-    ankle = _hinge(out, points, side, "ankle", knee[0], knee[1])
+    ankle = _hinge(out, points, side, joint="ankle", above=knee[0], hint=knee[1])
     if ankle is None:
         raise InputError(f"{side} leg", "no marker on the ankle", f"{side}_ankle_lateral",
                          "name the leg's markers in the marker set")
@@ -266,7 +266,7 @@ def _foot(out: Centres, points: Mapping[str, np.ndarray], side: str, ankle, stan
     else:
         middle = np.mean(front, axis=0)
         behind = points.get(f"{side}_heel", ankle[0])
-        axes = _foot_axes(out, points, side, ankle[0], middle - behind, standing)
+        axes = _foot_axes(out, points, side, ankle=ankle[0], forward=middle - behind, standing=standing)
     out.put(f"{name}Foot", ankle[0], axes, ankle[2])
     away = PLACES[f"{name}ToeBase"] - PLACES[f"{name}Foot"]
     toe = ankle[0] + axes @ (out.size * away)
@@ -303,9 +303,9 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     if marker is not None:
         plain = _outwards_plainly(chest, shoulder, marker, sign)
         if wrist is None or radial is not None:
-            elbow = _elbow(out, points, side, sign, shoulder, wrist, radial, plain)
+            elbow = _elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=radial, plain=plain)
         else:
-            elbow, wrist = _elbow_and_wrist(out, points, side, sign, shoulder, wrist, plain)
+            elbow, wrist = _elbow_and_wrist(out, points, side, sign=sign, shoulder=shoulder, marker=wrist, plain=plain)
     if elbow is None:
         out.notes.append(f"{side} arm: no marker on the elbow; left out")
         return
@@ -317,7 +317,8 @@ def _arm(out: Centres, points: Mapping[str, np.ndarray], side: str) -> None:
     along = sign * (wrist - place)
     axes = frame_along("Y", along, "Z", up) if radial is None else frame_along("Y", along, "X", radial)
     out.put(f"{name}ForeArm", place, axes, sigma)
-    _hand(out, points, side, sign, wrist, axes, SIGMAS["alone"] if radial is None else SIGMAS["both"])
+    _hand(out, points, side, sign=sign, wrist=wrist, forearm=axes,
+          sigma=SIGMAS["alone"] if radial is None else SIGMAS["both"])
 
 
 def _wrist(points, side) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -344,7 +345,7 @@ def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
     outwards = plain
     for _ in range(4):
         wrist = marker - inside * outwards
-        elbow = _elbow(out, points, side, sign, shoulder, wrist, None, plain)
+        elbow = _elbow(out, points, side, sign=sign, shoulder=shoulder, wrist=wrist, radial=None, plain=plain)
         outwards = elbow[1]
     return elbow, wrist
 
@@ -358,7 +359,7 @@ def _elbow(out, points, side, sign, shoulder, wrist, radial, plain):
         if outwards is not None:
             return lateral - half * outwards, outwards, SIGMAS["one side"]
     hint = plain if wrist is None or radial is None else sign * np.cross(radial, wrist - lateral)
-    return _hinge(out, points, side, "elbow", shoulder, hint)
+    return _hinge(out, points, side, joint="elbow", above=shoulder, hint=hint)
 
 
 def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:

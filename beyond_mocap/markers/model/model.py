@@ -51,7 +51,7 @@ class BallMarker:
     radius: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MarkerModel:
     """A body of J joints with M markers on it.
 

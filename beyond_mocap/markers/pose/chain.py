@@ -29,7 +29,7 @@ from ...motion.skeleton import Skeleton
 _AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Chain:
     """J joints, M markers on them, and what each joint may do.
 
@@ -97,11 +97,10 @@ def chain(
         raise InputError("marker model", f"axis orders {order}", f"{count} permutations of XYZ")
     free = np.broadcast_to(True if free is None else np.asarray(free, dtype=bool), (count, 3))
     stiff = np.zeros(count) if stiffness is None else np.asarray(stiffness, dtype=float)
-    return Chain(
-        skeleton, joint, places, order, free,
-        np.where(free, -np.inf if low is None else low, 0.0), np.where(free, np.inf if high is None else high, 0.0),
-        np.broadcast_to(stiff[:, None] if stiff.ndim == 1 else stiff, (count, 3)),
-    )
+    return Chain(skeleton=skeleton, joint=joint, places=places, order=order, free=free,
+                 low=np.where(free, -np.inf if low is None else low, 0.0),
+                 high=np.where(free, np.inf if high is None else high, 0.0),
+                 stiffness=np.broadcast_to(stiff[:, None] if stiff.ndim == 1 else stiff, (count, 3)))
 
 
 @dataclass(frozen=True, eq=False)

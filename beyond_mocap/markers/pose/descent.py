@@ -23,7 +23,7 @@ _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
 _BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HeldPoint:
     """A point of a joint's body that stands at a given distance from a seen point: a ball's centre in the hand, from a
     marker on the ball.
@@ -42,7 +42,7 @@ class HeldPoint:
         return replace(self, seen=self.seen[:, chosen], weight=self.weight[chosen])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Task:
     """What F poses are to come near to.
 
@@ -160,7 +160,7 @@ def state_of(task: Task, at: Poses) -> State:
         cost += np.einsum("jf,jaf,jaf->f", task.leaning**2, gone, gone)
     if task.point:
         cost += task.point.weight * distance(task.point, placed)[2] ** 2
-    return State(at, placed, away, bend, uneven, gone, 0.5 * cost)
+    return State(at, placed, away, bend=bend, uneven=uneven, gone=gone, cost=0.5 * cost)
 
 
 def _bend(chain: Chain, at: Poses) -> np.ndarray:
@@ -233,7 +233,8 @@ def _step(
     over = np.flatnonzero(outside.any(axis=(0, 1)))
     if len(over):
         part = best.frames(over)
-        again = _solved(task.frames(over), part, stops, damping[over], curved[over], ahead[..., over])
+        again = _solved(task.frames(over), part, stops, damping=damping[over], curved=curved[over],
+                        ahead=ahead[..., over])
         shift[:, over], turns[..., over], held[:, over] = again
         onto = limits.along(task.chain, again[2], part.poses, again[1], moved(task.chain, part.poses, *again[:2]))
         further.put(over, limits.held_back(task.chain, stops, onto)[0])
@@ -248,14 +249,15 @@ def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: n
     if task.point:
         x, along, far = distance(task.point, best.placed)
         across = task.point.weight * crosswise(far, task.point.radius)
-        elimination.add_distance(asked, task.point.joint, x, along, task.point.weight, far, across)
+        elimination.add_distance(asked, task.point.joint, x, along=along, weight=task.point.weight, away=far,
+                                 across=across)
     own = wishes(task, best)
     slope = elimination.gradient(task.chain, best.placed, about, asked, own)
-    held = limits.hold(task.chain, stops, best.poses, slope, own, ahead)
+    held = limits.hold(task.chain, stops, best.poses, slope=slope, own=own, ahead=ahead)
     bent = None
     if curved.any():
-        bent = elimination.bends(task.chain, best.placed, about, best.away, task.weights, curved)
-    return *elimination.step(task.chain, best.placed, about, asked, own, damping, bent), held
+        bent = elimination.bends(task.chain, best.placed, about, away=best.away, weights=task.weights, share=curved)
+    return *elimination.step(task.chain, best.placed, about, asked=asked, own=own, damping=damping, bent=bent), held
 
 
 def wishes(task: Task, best: State) -> elimination.Own:

@@ -45,7 +45,7 @@ def held_back(chain: Chain, joints: dict[str, np.ndarray], at: Poses) -> tuple[P
         outside = (angles[group] > chain.high[group][..., None]) | (angles[group] < chain.low[group][..., None])
         for joint, beyond in zip(group, outside.any(axis=1)):
             if beyond.any():
-                _bring_back(chain, joint, np.flatnonzero(beyond), local, angles, before)
+                _bring_back(chain, joint, np.flatnonzero(beyond), local=local, angles=angles, before=before)
     return Poses(at.root, local, angles), before
 
 
@@ -97,7 +97,8 @@ def hold(
     able = [*chain.hinges, *(joint for group in joints.values() for joint in group)]
     for joint in able:
         if touching[joint].any() or stops[joint].any():
-            _hold_joint(chain, joint, at.angles[joint], touching[joint], bound[joint], slope[joint], stops[joint], own)
+            _hold_joint(chain, joint, at.angles[joint], touching=touching[joint], bound=bound[joint],
+                        slope=slope[joint], stops=stops[joint], own=own)
     idle = np.setdiff1d(np.arange(len(stops)), able)
     stops[idle] = False
     return stops.any(axis=1)

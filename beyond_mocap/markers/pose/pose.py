@@ -92,7 +92,7 @@ def _turned(turns: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndar
     return quaternion.slerp(turns[before], turns[after], part)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class HeldBall:
     """A ball in the hand: its centre stands still in the hand, and a seen marker lies on its surface.
 
@@ -119,7 +119,7 @@ class PoseSettings:
     ball: HeldBall | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Solved:
     """What came out, for T frames of the model's M markers and J joints.
 
@@ -147,7 +147,8 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
     """
     began = time.perf_counter()
     seen = _positions(model, trial)
-    solving = _Solving(_chain(model, settings.limits), seen, settings, trial.fps, _usual(model), progress, cancelled)
+    solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=_usual(model),
+                       progress=progress, cancelled=cancelled)
     solving.run()
     return solving.result(time.perf_counter() - began)
 
@@ -155,8 +156,8 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
 def _chain(model, limited: bool) -> Chain:
     """The chain of a model."""
     freedom = model.freedom
-    made = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free, freedom.low, freedom.high,
-                 model.stiffness)
+    made = chain(model.skeleton, model.joint, model.places, order=freedom.order, free=freedom.free, low=freedom.low,
+                 high=freedom.high, stiffness=model.stiffness)
     return made if limited else made.without_limits()
 
 
@@ -276,9 +277,11 @@ class _Solving:
         point, ball = None, self.settings.ball
         if ball is not None:
             there = np.isfinite(ball.seen).all(axis=-1) & ball.held
-            point = HeldPoint(self.chain.skeleton.index(ball.joint), np.asarray(ball.centre, dtype=float), ball.radius,
-                              np.where(there[:, None], ball.seen, 0.0)[frames].T, ball.weight * there[frames])
-        return Task(self.chain, self.seen[..., frames], self.weights[frames].T, self.drawn, lean, leaning, point, _EVEN)
+            point = HeldPoint(joint=self.chain.skeleton.index(ball.joint), place=np.asarray(ball.centre, dtype=float),
+                              radius=ball.radius, seen=np.where(there[:, None], ball.seen, 0.0)[frames].T,
+                              weight=ball.weight * there[frames])
+        return Task(chain=self.chain, seen=self.seen[..., frames], weights=self.weights[frames].T, drawn=self.drawn,
+                    lean=lean, leaning=leaning, point=point, even=_EVEN)
 
     def _chunks(self, frames: np.ndarray):
         """Slices of a list of frames, with a look at the clock between."""
@@ -338,8 +341,9 @@ class _Solving:
         put = place(self.chain, self.poses)
         away = (put.markers + put.origin).transpose(2, 0, 1) - self.positions
         residual = np.sqrt(np.sum(away**2, axis=-1))
-        return Solved(motion, residual, self.weights, single_residual(self.chain, self.positions), self.steps,
-                      self.held.T.copy(), seconds, tuple(self.notes))
+        return Solved(motion=motion, residual=residual, weights=self.weights,
+                      single=single_residual(self.chain, self.positions), iterations=self.steps,
+                      at_limit=self.held.T.copy(), seconds=seconds, notes=tuple(self.notes))
 
 
 def single_residual(chain: Chain, seen: np.ndarray) -> np.ndarray:

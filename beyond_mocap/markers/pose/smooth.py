@@ -49,7 +49,7 @@ def _window(task: Task, at: Poses, strength: float, given: int) -> tuple[Poses, 
     cost = _cost(best, strength, task.chain, given)
     held = np.zeros((len(task.chain.skeleton), at.root.shape[-1]), dtype=bool)
     for _ in range(_MOST_STEPS):
-        shift, turns, stopped = _step(task, best, stops, strength, given, damping)
+        shift, turns, stopped = _step(task, best, stops, strength=strength, given=given, damping=damping)
         further = limits.held_back(task.chain, stops, moved(task.chain, best.poses, shift, turns))[0]
         trial = state_of(task, further)
         trial_cost = _cost(trial, strength, task.chain, given)

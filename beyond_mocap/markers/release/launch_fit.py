@@ -48,7 +48,7 @@ class Held:
     sigma: float = 0.006
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LaunchFit:
     """How the ball left.
 
@@ -98,7 +98,7 @@ def fit_launch(
     return search.told(best, at, seconds)
 
 
-@dataclass(eq=False)
+@dataclass(eq=False, kw_only=True)
 class _Flight:
     """One solved flight: its cost with the held frames before it, velocity, place and circle (a, b) of eq. 6.3."""
 
@@ -147,7 +147,8 @@ class _Search:
         residual = float(np.sqrt(miss[k].mean())) * _NOISE
         place, velocity, a, b = solved[k]
         total = float(cost[k]) + self._held_cost(t0)
-        return _Flight(total, velocity, place, (a, b), float(rates[k]), residual, sigma, count)
+        return _Flight(cost=total, velocity=velocity, place=place, circle=(a, b), rate=float(rates[k]),
+                       residual=residual, speed_sigma=sigma, frames=count)
 
     def leaves(self, last: float) -> bool:
         """Whether the marker is seen away from where the hand would have it, up to a first flight after `last`."""
@@ -228,10 +229,9 @@ class _Search:
             sides.append(abs(shifts[worse.index(True)]) if True in worse else abs(shifts[-1]))
         spin, offset, centre = self._turning(flight, t0)
         sigma = float(np.hypot(np.mean(sides), 0.2 / self.fps))
-        return LaunchFit(
-            float(t0), centre, flight.velocity, spin, offset, float(np.linalg.norm(flight.circle[0])), flight.residual,
-            sigma, flight.speed_sigma, flight.frames, seconds,
-        )  # fmt: skip
+        return LaunchFit(time=float(t0), position=centre, velocity=flight.velocity, spin=spin, offset=offset,
+                         circle=float(np.linalg.norm(flight.circle[0])), residual=flight.residual, time_sigma=sigma,
+                         speed_sigma=flight.speed_sigma, frames=flight.frames, seconds=seconds)  # fmt: skip
 
 
 def _robust(squares: np.ndarray) -> np.ndarray:

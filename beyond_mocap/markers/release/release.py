@@ -63,7 +63,7 @@ class ReleaseSettings:
     centre: tuple[float, float, float] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Release:
     """How the ball left.
 
@@ -145,11 +145,12 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     notes += even.notes[len(trial.notes) :]
     found = None
     if marker is not None:
-        found = _by_ball(hand, marker, lies, ball, settings, notes)
-        found = _believed(found, hand, marker, label, lies.radius, settings, even.name, notes)
+        found = _by_ball(hand, marker, lies, ball=ball, settings=settings, notes=notes)
+        found = _believed(found, hand, marker, label=label, radius=lies.radius, settings=settings, name=even.name,
+                          notes=notes)
     found = found or _by_hand(hand, motion, lies, ball, notes)
     seen = np.zeros(len(hand), bool) if marker is None else np.isfinite(marker).all(axis=-1)
-    return _result(found, hand, motion, lies, seen, even.name, notes)
+    return _result(found, hand, motion, lies=lies, seen=seen, name=even.name, notes=notes)
 
 
 def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings: ReleaseSettings, name: str, notes):
@@ -207,7 +208,7 @@ def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
     return float(np.linalg.norm(found.launch.position - palm[k]))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Found:
     """A launch, in the markers' space, and how sure it is."""
 
@@ -231,12 +232,12 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     way = fly(launch, found.ball, _LONGEST, ground)
     impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
-    return Release(
-        launch.time, int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)), launch.position, launch.velocity,
-        np.asarray(launch.spin, float), found.time_sigma, found.speed_sigma, found.way_sigma, hand.side,
-        found.how, found.residual, found.frames, radar_speed(name), lies.centre, lies.radius,
-        BallPath(hand.times, places, seen), impact, hips, tuple(notes),
-    )  # fmt: skip
+    return Release(time=launch.time, frame=int(np.clip(round(launch.time * hand.fps), 0, len(hand) - 1)),
+                   position=launch.position, velocity=launch.velocity, spin=np.asarray(launch.spin, float),
+                   time_sigma=found.time_sigma, speed_sigma=found.speed_sigma, way_sigma=found.way_sigma,
+                   side=hand.side, how=found.how, residual=found.residual, flight_frames=found.frames,
+                   radar=radar_speed(name), centre=lies.centre, radius=lies.radius,
+                   path=BallPath(hand.times, places, seen), impact=impact, hips=hips, notes=tuple(notes))  # fmt: skip
 
 
 def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
@@ -338,7 +339,9 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
-    fits = [(fit_launch(marker, course, hand.fps, guess, air, lies.radius, settings.window), air)
+    fits = [(fit_launch(
+        marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius, window=settings.window,
+    ), air)
             for air in (ball, _without_air(ball))]
     if fits[0][0] is None or fits[1][0] is None:
         return None
@@ -349,7 +352,8 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     air = float(np.linalg.norm(fits[0][0].velocity - fits[1][0].velocity))
     speed_sigma = float(np.hypot(fit.speed_sigma, _AIR * air))
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
-    return _Found(launch, ball, "ball", fit.time_sigma, speed_sigma, way_sigma, fit.residual, fit.frames, fit.circle)
+    return _Found(launch=launch, ball=ball, how="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
+                  way_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
 
 
 def _without_air(ball: Ball) -> Ball:
@@ -362,7 +366,8 @@ def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _
     if not hand.markers:
         notes.append("no markers near the hand: the motion tells alone, which its filter has made slower")
     launch = Launch(found.time, found.position, found.velocity)
-    return _Found(launch, ball, "hand", found.time_sigma, found.speed_sigma, found.way_sigma)
+    return _Found(launch=launch, ball=ball, how="hand", time_sigma=found.time_sigma, speed_sigma=found.speed_sigma,
+                  way_sigma=found.way_sigma)
 
 
 def _stride(motion: Motion) -> np.ndarray:

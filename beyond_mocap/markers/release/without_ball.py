@@ -48,7 +48,7 @@ _ARC = 0.35  # rad by which a hand climbs or falls that goes over the top, witho
 _LEAST_STEP = 0.25  # m between the feet along the throw, from where on they tell its direction
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class HandRelease:
     """How the ball left by the hand alone. time: s from frame 0. position: (3,) m of its centre. velocity: (3,) m/s.
     time_sigma, speed_sigma, way_sigma: s, m/s and rad, one standard deviation. rolled: s that it took along the
@@ -85,10 +85,9 @@ def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None)
     velocity = velocity + push * float((tips[k] - velocity) @ push)
     position = course.place(PAD)[k] + radius * push
     time_sigma = float(np.hypot(max(TIME_SIGMA, 0.5 * rolled), 0.3 / hand.fps))
-    return HandRelease(
-        float(times[k]), position, velocity, time_sigma, SPEED_SIGMA * float(np.linalg.norm(velocity)),
-        _swept(grip[_about(times, start, time_sigma)]), float(rolled),
-    )  # fmt: skip
+    return HandRelease(time=float(times[k]), position=position, velocity=velocity, time_sigma=time_sigma,
+                       speed_sigma=SPEED_SIGMA * float(np.linalg.norm(velocity)),
+                       way_sigma=_swept(grip[_about(times, start, time_sigma)]), rolled=float(rolled))  # fmt: skip
 
 
 def _roll(turning: float) -> float:

@@ -10,7 +10,7 @@ LEAST = 6
 """Pairs below which Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Paired:
     """count: of pairs. mean, sd: m/s of estimated - measured. share: of the measured, mean of the absolute differences.
     within: share of pairs that differ by at most 10 %. wilcoxon: two-sided p that the differences are about zero, and
@@ -34,12 +34,11 @@ def paired(estimated: np.ndarray, measured: np.ndarray) -> Paired:
     known = np.isfinite(estimated) & np.isfinite(measured)
     off, base = (estimated - measured)[known], measured[known]
     if not len(off):
-        return Paired(0, *[np.nan] * 6)
+        none = float("nan")
+        return Paired(count=0, mean=none, sd=none, share=none, within=none, wilcoxon=none, normal=none)
     varies = len(off) > 1 and np.ptp(off) > 1e-12
     share = np.abs(off) / base
-    return Paired(
-        len(off), float(off.mean()), float(off.std(ddof=1)) if len(off) > 1 else np.nan, float(share.mean()),
-        float(np.mean(share <= 0.1)),
-        float(wilcoxon(off).pvalue) if len(off) >= LEAST and np.any(off != 0.0) else np.nan,
-        float(shapiro(off).pvalue) if len(off) >= 3 and varies else np.nan,
-    )  # fmt: skip
+    return Paired(count=len(off), mean=float(off.mean()), sd=float(off.std(ddof=1)) if len(off) > 1 else np.nan,
+                  share=float(share.mean()), within=float(np.mean(share <= 0.1)),
+                  wilcoxon=float(wilcoxon(off).pvalue) if len(off) >= LEAST and np.any(off != 0.0) else np.nan,
+                  normal=float(shapiro(off).pvalue) if len(off) >= 3 and varies else np.nan)  # fmt: skip

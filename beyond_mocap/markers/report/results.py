@@ -13,7 +13,7 @@ from ...base.errors import InputError
 from ...evaluation.report import check_depth
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Throw:
     """A release. speed, radar: m/s, radar None where the file's name had none. side: of the hand. hips: (2,) m at the
     start, impact: (2,) m on the ground, None where the ball never came down. velocity: (3,) m/s. how: "ball" or "hand".
@@ -28,7 +28,7 @@ class Throw:
     how: str
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class TrialResult:
     """One trial. subject: as the file says, else its session, "" where unknown. frames: how many. squares: m^2,
     weighted squared residuals a frame (mean and standard deviation; eq. 5.1). residual, single: mm, root mean square of
@@ -63,19 +63,18 @@ def read_results(folder: Path) -> tuple[TrialResult, ...]:
 def _of_row(folder: Path, row: Mapping) -> TrialResult:
     name = str(row.get("trial", ""))
     if row.get("error") or not row.get("report"):
-        return TrialResult(name, str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
+        return TrialResult(name=name, subject=str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
     found = _of_report(name, _read(folder / row["report"]))
     return found if found.subject else replace(found, subject=str(row.get("session") or ""))
 
 
 def _of_report(name: str, report: Mapping) -> TrialResult:
     residual, squares = report.get("residual_mm") or {}, report.get("weighted_se") or {}
-    return TrialResult(
-        name, str(report.get("subject") or ""), int(report.get("frames") or 0),
-        (_number(squares.get("mean")), _number(squares.get("sd"))), _number(residual.get("rms", residual.get("mean"))),
-        _number(residual.get("single_rms", residual.get("single_mean"))), _number(report.get("frames_per_second")),
-        _throw(report.get("release")),
-    )  # fmt: skip
+    return TrialResult(name=name, subject=str(report.get("subject") or ""), frames=int(report.get("frames") or 0),
+                       squares=(_number(squares.get("mean")), _number(squares.get("sd"))),
+                       residual=_number(residual.get("rms", residual.get("mean"))),
+                       single=_number(residual.get("single_rms", residual.get("single_mean"))),
+                       rate=_number(report.get("frames_per_second")), throw=_throw(report.get("release")))  # fmt: skip
 
 
 def _throw(release: Mapping | None) -> Throw | None:
@@ -84,10 +83,10 @@ def _throw(release: Mapping | None) -> Throw | None:
     impact = release.get("impact_m")
     speed = float(release["speed_m_s"])
     return Throw(
-        speed, release.get("radar_speed_m_s"), str(release.get("hand", "")),
-        np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
-        None if impact is None else np.array(impact[:2], float),
-        speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float), str(release.get("how", "")),
+        speed=speed, radar=release.get("radar_speed_m_s"), side=str(release.get("hand", "")),
+        hips=np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
+        impact=None if impact is None else np.array(impact[:2], float),
+        velocity=speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float), how=str(release.get("how", "")),
     )  # fmt: skip
 
 

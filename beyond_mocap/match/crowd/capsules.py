@@ -82,12 +82,18 @@ def _capsules(same: _Same) -> tuple[Capsule, ...]:
         found.append(Capsule(body.left.upper_arm, body.right.upper_arm, radius["shoulders"]))
     for side, limb in enumerate((body.left, body.right)):
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
-            found.append(Capsule(limb.upper_arm, limb.lower_arm, radius["upper_arm"], 0.0, "arm", side))
-            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND, "arm", side))
-        found.append(Capsule(limb.upper_leg, limb.lower_leg, radius["upper_leg"], 0.0, "leg", side, (0.0, 0.5)))
-        found.append(Capsule(limb.lower_leg, limb.foot, radius["lower_leg"], 0.0, "leg", side, (0.5, 1.0)))
+            found.append(Capsule(
+                limb.upper_arm, limb.lower_arm, radius["upper_arm"], beyond=0.0, limb="arm", side=side,
+            ))
+            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], beyond=size * HAND, limb="arm",
+                                 side=side))
+        found.append(Capsule(limb.upper_leg, limb.lower_leg, radius["upper_leg"], beyond=0.0, limb="leg", side=side,
+                             along=(0.0, 0.5)))
+        found.append(Capsule(limb.lower_leg, limb.foot, radius["lower_leg"], beyond=0.0, limb="leg", side=side,
+                             along=(0.5, 1.0)))
         if limb.toe is not None:
-            found.append(Capsule(limb.foot, limb.toe, radius["foot"], 0.0, "leg", side, (1.0, 1.0)))
+            found.append(Capsule(limb.foot, limb.toe, radius["foot"], beyond=0.0, limb="leg", side=side,
+                                 along=(1.0, 1.0)))
     return tuple(found)
 
 
@@ -139,7 +145,8 @@ def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], 
     depth = both - far
     keep = np.flatnonzero(depth >= least)
     away = off[keep] / np.maximum(far[keep], 1e-9)[:, None]
-    return Touching(frame[keep], a[keep], b[keep], depth[keep], both[keep], away, at_a[keep], at_b[keep])
+    return Touching(frame[keep], a[keep], b[keep], depth=depth[keep], radii=both[keep], away=away, at_one=at_a[keep],
+                    at_other=at_b[keep])
 
 
 def _balls_meet(one: np.ndarray, other: np.ndarray, reach: np.ndarray) -> np.ndarray:

@@ -131,7 +131,7 @@ def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], p
     pairs = [(number[one], number[other]) for one, other in episode.pairs]
     pressed = [pressures.setdefault(pair, Pressure()) for pair in episode.pairs]
     now = [curves[body][low:high] for body in episode.bodies]
-    for body, own in zip(episode.bodies, pushed(mine, pairs, now, pressed, held, fps, low)):
+    for body, own in zip(episode.bodies, pushed(mine, pairs, now, pressures=pressed, held=held, fps=fps, first=low)):
         curves[body][low:high] = own
 
 

@@ -35,7 +35,7 @@ REACH = 2.0
 _SETTLED = 8.0  # s of an edit list, beyond those, by which its motion does not depend on where it begins
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class CrowdPart:
     """What a window says of one player. correction: of his motion; frames (K,) of the match's clock at which he is in
     somebody, and depth (K,) m how deep when corrected; before: m, the deepest without it; led_frames (L,) and led (L,
@@ -119,10 +119,9 @@ def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
         led.append(off[mine])
         core = slice(max(inside[0] - first, 0), max(inside[1] - first, 0))
         before = max(before, float(deep[core].max(initial=0.0)))
-    return CrowdPart(
-        in_turn([correction for correction, *_ in rows], fps), np.concatenate(frames), np.concatenate(depth), before,
-        np.concatenate(led_frames), np.concatenate(led),
-    )  # fmt: skip
+    return CrowdPart(correction=in_turn([correction for correction, *_ in rows], fps), frames=np.concatenate(frames),
+                     depth=np.concatenate(depth), before=before, led_frames=np.concatenate(led_frames),
+                     led=np.concatenate(led))  # fmt: skip
 
 
 def in_turn(corrections: Sequence[Correction], fps: float) -> Correction:

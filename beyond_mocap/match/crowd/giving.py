@@ -35,7 +35,7 @@ _UPRIGHT = 0.35  # least share of a push that goes over the ground
 _HELD = 1e6  # weight that holds a value: far above all others
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Calm:
     """What keeps a body's curves small and smooth, whatever its contacts: the squares of its root and feet and of each
     arm, over the frames low .. low + count in which it is there."""
@@ -56,15 +56,15 @@ class Calm:
             arms.append(BandedLeastSquares(high - low, 3))
             for axis in range(3):
                 values = curves[low:high, ARMS.start + 3 * side + axis]
-                _calm(arms[side], axis, ARM_STAY, ARM_SECONDS, body.firm[low:high], fps)
+                _calm(arms[side], axis, ARM_STAY, seconds=ARM_SECONDS, firm=body.firm[low:high], fps=fps)
                 _hold(arms[side], axis, values, held)
-        return cls(body, low, high - low, whole, tuple(arms))
+        return cls(body=body, low=low, count=high - low, root_and_feet=whole, arms=tuple(arms))
 
 
 def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:
     squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE / fps
     for curve in range(ARMS.start):
-        _calm(squares, curve, STAY, SECONDS if curve < FEET.start else FOOT_SECONDS, body.firm, fps)
+        _calm(squares, curve, STAY, seconds=SECONDS if curve < FEET.start else FOOT_SECONDS, firm=body.firm, fps=fps)
         _hold(squares, curve, curves[:, curve], held)
     frames = np.arange(len(curves)) * ARMS.start
     for side in (0, 1):
@@ -103,7 +103,8 @@ def given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: flo
         if len(rows):
             shoulder = placed[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
             columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
-            out[there, columns] = _arm(calm, side, mine, rows, shoulder, curves[:, columns], weight)
+            out[there, columns] = _arm(calm, side, mine, rows=rows, shoulder=shoulder, turns=curves[:, columns],
+                                       weight=weight)
     whole = np.flatnonzero(~is_arm | arms_too)
     if len(whole) or curves[there, : ARMS.start].any():
         out[there, : ARMS.start] = _root_and_feet(calm, mine, whole, curves, weight)

@@ -35,7 +35,7 @@ def kept_parts(path: Path) -> tuple[CrowdPart, ...] | None:
             header = json.loads(kept["header"].tobytes())
             return tuple(
                 CrowdPart(
-                    Correction(kept[f"{number}.knots"], kept[f"{number}.values"], fps, step),
+                    correction=Correction(kept[f"{number}.knots"], kept[f"{number}.values"], fps, step),
                     before=before, **{name: kept[f"{number}.{name}"] for name in _ARRAYS},
                 ) for number, (fps, step, before) in enumerate(header)
             )  # fmt: skip

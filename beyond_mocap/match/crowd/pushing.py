@@ -56,10 +56,11 @@ def pushed(
         placed = [moved(body, values) for body, values in zip(bodies, now)]
         if turn % _LOOKED_OVER == 0:
             near = [_near_frames(bodies, placed, pair) for pair in pairs]
-        contacts = _contacts(bodies, placed, pairs, near, pressures, first, fps)
+        contacts = _contacts(bodies, placed, pairs, near=near, pressures=pressures, first=first, fps=fps)
         for number, mine in enumerate(contacts):
             if len(mine.frame) and calm[number].count > 3:
-                wanted = given(calm[number], mine, now[number], placed[number], turn >= _ARMS_ALONE, BASE / fps)
+                wanted = given(calm[number], mine, now[number], placed=placed[number], arms_too=turn >= _ARMS_ALONE,
+                               weight=BASE / fps)
                 now[number] = now[number] + _STEP * (wanted - now[number])
     return now
 
@@ -84,7 +85,8 @@ def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) ->
         found = replace(found, frame=frames[found.frame])
         found, way, give = _pressing(found, two, pressure, first, fps)
         for body, against, sign in ((one, other, 1.0), (other, one, -1.0)):
-            rows[body].append(_share(found, sign * way, give, bodies, placed, (body, against), sign > 0.0))
+            rows[body].append(_share(found, sign * way, give, bodies=bodies, placed=placed, pair=(body, against),
+                                     is_one=sign > 0.0))
     empty = (np.zeros(0, int),) * 2 + (np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0))
     return [Contact(*(np.concatenate(columns) for columns in zip(empty, *mine))) for mine in rows]
 

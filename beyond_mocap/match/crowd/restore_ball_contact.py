@@ -57,4 +57,4 @@ def _meeting(motion: Motion, key: KeyResult, ball: np.ndarray, alone: tuple[floa
     if not OPEN < gaps[nearest] < CLOSED:
         return None
     entry, leave = (min(EASE * motion.fps, frames) for frames in alone)
-    return Meeting(float(frame), parts[nearest], ball[frame], BALL_RADIUS, entry, leave)
+    return Meeting(float(frame), parts[nearest], ball[frame], radius=BALL_RADIUS, entry=entry, leave=leave)

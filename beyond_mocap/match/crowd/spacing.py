@@ -71,7 +71,7 @@ def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: fl
     shifts = np.zeros(places.shape)
     for turn in range(_ROUNDS):
         seconds = _TURNED[turn] if turn < len(_TURNED) else 0.0
-        rows = [_lacking(places, shifts, pair, distance, seconds, fps) for pair in pairs]
+        rows = [_lacking(places, shifts, pair, distance=distance, seconds=seconds, fps=fps) for pair in pairs]
         index, values, goal = (np.concatenate(parts) for parts in zip(*rows))
         if not len(index):
             break

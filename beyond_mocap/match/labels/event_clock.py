@@ -53,7 +53,7 @@ _UNLIKE = 0.6  # s that another kind or part of the body is worth
 _NO_TOUCH = 1.4  # s that an event without a touch is worth
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PeriodClock:
     """lag: s that events of a period are later than their touches, at its begin; drift: s that it grows each second.
     spread: s, the usual distance from it (median absolute deviation times 1.48). matched: share of the events that are
@@ -74,7 +74,7 @@ class PeriodClock:
         return self.sure >= _LEAST_SURE and self.matched >= max(_LEAST_MATCHED, _ABOVE_CHANCE * self.by_chance)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class AlignedEvents:
     """The events of a match on the tracking's clock. events: as given. times: (E,) s of each on the match's clock, lag
     taken out; NaN in halves whose clock cannot be set. touches: (E,) the index of each one's solved touch, -1 where it
@@ -116,7 +116,7 @@ def aligned(
         times[[i for i, event in enumerate(events.events) if event.period == number]] = np.nan
     pairs = _pairs(events.events, times, touches)
     notes += [_told(number, clock) for number, clock in clocks.items()]
-    return AlignedEvents(events.events, times, pairs, clocks, tuple(notes))
+    return AlignedEvents(events=events.events, times=times, touches=pairs, clocks=clocks, notes=tuple(notes))
 
 
 def _half_clock(events, touches, half: Half, span) -> tuple[PeriodClock, np.ndarray] | None:
@@ -158,7 +158,7 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     early, late, certain = np.array(early), np.array(late), np.array(origin)
     lag = _commonest(early - late, np.where(certain, 1.0, _DOUBTFUL))
     lag, drift = _line(early, late, lag)
-    fit = _Fit(events, since, when, who, (span[0] - start, span[1] - start), drift)
+    fit = _Fit(events, since, when, who=who, span=(span[0] - start, span[1] - start), drift=drift)
     right, wrong = fit.at([lag]), fit.at([lag + by for by in _CHANCES])
     if right[0, 1] < _INSIDE:
         return None
@@ -168,7 +168,8 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
     doubtful = _sure(right[1, 0], right[1, 1], wrong[1, 0] / max(wrong[1, 1], 1))
     sure = _sure(right[0, 0], right[0, 1], chance) + _DOUBTFUL * doubtful - _far(lag)
-    return PeriodClock(float(lag), float(drift), spread, float(matched), float(chance), int(right[0, 1]), float(sure))
+    return PeriodClock(lag=float(lag), drift=float(drift), spread=spread, matched=float(matched),
+                       by_chance=float(chance), told=int(right[0, 1]), sure=float(sure))
 
 
 def _commonest(lags: np.ndarray, weights: np.ndarray) -> float:

@@ -43,7 +43,7 @@ _LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KIN
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Moment:
     """What a player does: time s on the match's clock; words; source: TOUCHES, EVENTS, BOTH or USER; confidence 0 to 1.
     end: s, of a stretch that begins at `time`, None for a key moment."""
@@ -101,12 +101,15 @@ def words_of(
     for player, path in zip(match.players, match.positions):
         own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
         found = [
-            moment_of(touch, match.times, path, heights, table, onto.events[told[i]] if i in told else None)
+            moment_of(touch, match.times, path, heights=heights, table=table,
+                      event=onto.events[told[i]] if i in told else None)
             for i, touch in own
         ]
         found = [moment for moment in found if moment]
         sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
-        sure += _untouched(player.id, onto, span, match.times, path, table, found) if onto else []
+        sure += _untouched(
+            player.id, onto, span, times=match.times, path=path, table=table, beside=found,
+        ) if onto else []
         kept = apart(sure)
         left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
         left_out["close"] += len(sure) - len(kept)
@@ -127,7 +130,7 @@ def _untouched(player: str, onto: AlignedEvents, span, times, path, table, besid
             continue
         filled_in = {**seen_words(time, times, path), "side": event.side}
         words = table.words(event.kind, event.part or "foot", event.details, filled_in)
-        out += [Moment(round(time, 3), words, EVENTS, _TOLD)] * bool(words)
+        out += [Moment(time=round(time, 3), words=words, source=EVENTS, confidence=_TOLD)] * bool(words)
     return out
 
 
@@ -162,13 +165,15 @@ def moment_of(
     filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
     if event is None:
         words = table.words(kind, touch.part, details, filled_in)
-        return Moment(round(touch.time, 3), words, TOUCHES, round(touch.confidence, 3)) if words else None
+        return Moment(
+            time=round(touch.time, 3), words=words, source=TOUCHES, confidence=round(touch.confidence, 3),
+        ) if words else None
     part, filled_in = event.part or touch.part, {**filled_in, "side": event.side}
     if part != touch.part:
         filled_in.update(height_words(part, touch.position[2], heights))
     words = table.words(event.kind, part, event.details, filled_in) or table.words(kind, part, details, filled_in)
     sure = 1.0 - _FORGETS * (1.0 - touch.confidence)
-    return Moment(round(touch.time, 3), words, BOTH, round(sure, 3)) if words else None
+    return Moment(time=round(touch.time, 3), words=words, source=BOTH, confidence=round(sure, 3)) if words else None
 
 
 def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
@@ -217,7 +222,8 @@ def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
         if lasts >= _SHORTEST and any(touch.kind == kinds.DRIBBLE for touch in chain):
             sure = float(np.mean([touch.confidence for touch in chain]))
             out.append(
-                Moment(round(chain[0].time, 3), _DRIBBLE.labels, TOUCHES, round(sure, 3), round(chain[-1].time, 3))
+                Moment(time=round(chain[0].time, 3), words=_DRIBBLE.labels, source=TOUCHES, confidence=round(sure, 3),
+                       end=round(chain[-1].time, 3))
             )
     return out
 

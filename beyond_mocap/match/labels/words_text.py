@@ -46,8 +46,10 @@ def read_words(
     timeline = parse_timeline(read_text(path), str(path))
     validate(timeline, known_words, where=str(path))
     known = {_line(moment): moment for moment in automatic}
-    found = [Moment(key.time, key.words, USER, 1.0) for key in timeline.keys]
-    found += [Moment(span.start, span.words, USER, 1.0, span.end) for span in timeline.spans]
+    found = [Moment(time=key.time, words=key.words, source=USER, confidence=1.0) for key in timeline.keys]
+    found += [Moment(
+        time=span.start, words=span.words, source=USER, confidence=1.0, end=span.end,
+    ) for span in timeline.spans]
     return ordered(known.get(_line(moment), moment) for moment in found)
 
 

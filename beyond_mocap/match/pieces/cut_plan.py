@@ -43,10 +43,10 @@ def cut_track(track: Track, start: float, end: float) -> Track:
         times,
         _between(track.times, track.positions, times, before, after),
         _between(track.times, track.ball, times, before, after),
-        track.ball_height_known[before] & track.ball_height_known[after],
-        track.filled[before] | track.filled[after],
-        track.outlier[before] | track.outlier[after],
-        track.name,
+        ball_height_known=track.ball_height_known[before] & track.ball_height_known[after],
+        filled=track.filled[before] | track.filled[after],
+        outlier=track.outlier[before] | track.outlier[after],
+        name=track.name,
     )
 
 

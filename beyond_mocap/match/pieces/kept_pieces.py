@@ -39,6 +39,6 @@ def kept_piece(path: Path) -> Piece | None:
         clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
         told = tuple(TimedLine(text, *spans) for text, spans in header["warnings"])
         header |= {"own": tuple(header["own"]), "warnings": told}
-        return Piece(edit=NamedEdit(clips, **arrays, keys=keys), **header)
+        return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
     except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
         return None

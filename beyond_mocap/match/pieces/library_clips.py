@@ -31,7 +31,8 @@ def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> Nam
     keys = [_named_key(placed, row, moments[placed.wanted].time) for placed in edit.keys]
     clip = np.array([row[int(clip)] for clip in edit.clip[starts]], int)
     cut = np.isin(starts, edit.seams) | (starts == 0)
-    return NamedEdit(clips, clip, local[starts], rate, length, cut, tuple(sorted(keys, key=lambda key: key.time)))
+    return NamedEdit(clips=clips, clip=clip, first=local[starts], rate=rate, length=length, cut=cut,
+                     keys=tuple(sorted(keys, key=lambda key: key.time)))
 
 
 def _run_starts(edit: EditList, local: np.ndarray) -> list[int]:
@@ -45,7 +46,8 @@ def _run_starts(edit: EditList, local: np.ndarray) -> list[int]:
 
 def _named_key(placed: PlacedKey, row: dict[int, int], time: float) -> NamedKey:
     key = placed.key
-    return NamedKey(time, row[key.clip], key.frame, key.start, key.end, tuple(sorted(key.words)))
+    return NamedKey(time=time, clip=row[key.clip], frame=key.frame, start=key.start, end=key.end,
+                    words=tuple(sorted(key.words)))
 
 
 def bound(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) -> EditList:

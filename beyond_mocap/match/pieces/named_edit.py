@@ -19,7 +19,7 @@ ClipName = tuple[str, bool]
 """A clip's path below the library, and whether it is mirrored."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class NamedKey:
     """A key moment of the timeline, asked for at `time` s, is served by a key moment of a clip: clip of the table;
     frame, start and end in the clip's own rate; words that it carries there."""
@@ -32,7 +32,7 @@ class NamedKey:
     words: tuple[str, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class NamedEdit:
     """R runs of T frames in all, at the library's rate.
 
@@ -80,9 +80,8 @@ def part(edit: NamedEdit, low: int, high: int) -> NamedEdit:
     kept = end > begin
     first = edit.first + edit.rate * (begin - starts)
     cut = np.where(begin == low, True, edit.cut)
-    return NamedEdit(
-        edit.clips, edit.clip[kept], first[kept], edit.rate[kept], (end - begin)[kept], cut[kept], edit.keys
-    )
+    return NamedEdit(clips=edit.clips, clip=edit.clip[kept], first=first[kept], rate=edit.rate[kept],
+                     length=(end - begin)[kept], cut=cut[kept], keys=edit.keys)
 
 
 def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
@@ -94,7 +93,8 @@ def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:
     for join in np.cumsum([len(each.clip) for each in parts])[:-1]:
         goes_on = first[join - 1] + rate[join - 1] * length[join - 1]
         cut[join] = clip[join] != clip[join - 1] or abs(first[join] - goes_on) > CONTINUES
-    return NamedEdit(clips, clip, first, rate, length, cut, tuple(sorted(keys, key=lambda key: key.time)))
+    return NamedEdit(clips=clips, clip=clip, first=first, rate=rate, length=length, cut=cut,
+                     keys=tuple(sorted(keys, key=lambda key: key.time)))
 
 
 def table(parts: Sequence[NamedEdit]) -> tuple[ClipName, ...]:

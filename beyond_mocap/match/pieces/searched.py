@@ -19,7 +19,7 @@ from .named_edit import NamedEdit
 from .units import Unit
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Piece:
     """What was found for a window. player, stretch, number, first, own: the unit's (`units.Unit`). edit: at the
     library's rate, from the unit's first frame on. seconds: of processor time that it took. warnings: what the library
@@ -52,10 +52,9 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
         order = build_order(library, plan)
         search = PathSearch(library, order, balanced(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
         edit = exact_keys(library, search.run(), order)
-    return Piece(
-        unit.player, unit.stretch, unit.number, unit.first, unit.own, named(library, edit, plan.timeline.keys),
-        time.process_time() - begun, order.warnings, search.hurried,
-    )  # fmt: skip
+    return Piece(player=unit.player, stretch=unit.stretch, number=unit.number, first=unit.first, own=unit.own,
+                 edit=named(library, edit, plan.timeline.keys), seconds=time.process_time() - begun,
+                 warnings=order.warnings, hurried=search.hurried)  # fmt: skip
 
 
 def searched_library(library: Library, plan: Plan) -> Library:

@@ -99,7 +99,7 @@ def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
     at = np.flatnonzero(same[1:] & same[:-1]) + 1
     if len(at):
         return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
-    return Joint(low + 1 + int(np.argmin(_costs(library, plan, before, after, low, high))), False)
+    return Joint(low + 1 + int(np.argmin(_costs(library, plan, before, after=after, low=low, high=high))), False)
 
 
 def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:

@@ -40,7 +40,7 @@ SEARCH, CROWD = "search", "crowd"
 Report = Callable[[float, str], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Job:
     """What all stages share. source: the library as workers read it; library: as this process has it; place: who works;
     report(fraction of the stage, text); cancelled()."""
@@ -200,12 +200,13 @@ def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -
     """One player's windows as one."""
     if not parts:
         none = np.zeros(0)
-        return CrowdPart(in_turn([], fps), none.astype(int), none, 0.0, none.astype(int), np.zeros((0, 3)))
+        return CrowdPart(correction=in_turn([], fps), frames=none.astype(int), depth=none, before=0.0,
+                         led_frames=none.astype(int), led=np.zeros((0, 3)))
     cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
     only = [one for one, _ in parts]
     arrays = {name: np.concatenate([getattr(one, name) for one in only])
               for name in ("frames", "depth", "led_frames", "led")}  # fmt: skip
-    return CrowdPart(joined(cores, round(REACH * fps)), before=max(one.before for one in only), **arrays)
+    return CrowdPart(correction=joined(cores, round(REACH * fps)), before=max(one.before for one in only), **arrays)
 
 
 def finish(
@@ -221,8 +222,8 @@ def finish(
         for player, part in mine.items():
             edit = replace(edits[player], correction=crowd[player].correction)
             write_player(job.folder.of(part.file, "take.npz"), edit)
-            order = Finish(edit, part.role.measured, ball, crowd[player].frames, crowd[player].depth,
-                           job.order.figures, job.order.bvh)  # fmt: skip
+            order = Finish(edit=edit, measured=part.role.measured, ball=ball, frames=crowd[player].frames,
+                           depth=crowd[player].depth, figures=job.order.figures, bvh=job.order.bvh)  # fmt: skip
             names[player] = job.named(replace(order, edit=_unnamed([edit])[0]), part.role.player, part.role.notes)
             if _is_finished(job, part, names[player]):
                 done += 1

@@ -33,7 +33,7 @@ _SHORTEST = 0.25
 """Share of a window below which the last or the first one goes to its neighbour."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Unit:
     """One player's window of work, with all that is needed to search it.
 
@@ -69,8 +69,9 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     for number, (low, high) in enumerate(zip(edges, edges[1:])):
         first, end = max(0, low - before), min(count, high + behind)
         part = cut_plan(plan, begin + first / FPS, begin + (end - 1) / FPS)
-        times = begin + low / FPS, begin + high / FPS
-        units.append(Unit(plan.track.name, number, *times, part, stretch, first, (low, high)))
+        start, until = begin + low / FPS, begin + high / FPS
+        units.append(Unit(player=plan.track.name, number=number, start=start, end=until, plan=part, stretch=stretch,
+                          first=first, own=(low, high)))
     return tuple(units)
 
 

@@ -32,7 +32,7 @@ class PlayerFiles:
     files: dict[str, bytes]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Finish:
     """What is needed to finish a player. edit: his edit list, with its correction; measured: his tracks, one
     per stretch; ball: the match's; frames (K,) of the match's clock at which he is in somebody, depth (K,) m how deep.
@@ -94,12 +94,12 @@ def _overlap(take: Take, order: Finish) -> np.ndarray:
 def in_turn(tables: Sequence[Provenance]) -> Provenance:
     """The provenance of several stretches, one behind the other."""
     return Provenance(
-        np.concatenate([one.times for one in tables]),
-        tuple(clip for one in tables for clip in one.clip),
-        np.concatenate([one.clip_frame for one in tables]),
-        np.concatenate([one.mirrored for one in tables]),
-        tuple(words for one in tables for words in one.words),
-        np.concatenate([one.contacts for one in tables]),
+        times=np.concatenate([one.times for one in tables]),
+        clip=tuple(clip for one in tables for clip in one.clip),
+        clip_frame=np.concatenate([one.clip_frame for one in tables]),
+        mirrored=np.concatenate([one.mirrored for one in tables]),
+        words=tuple(words for one in tables for words in one.words),
+        contacts=np.concatenate([one.contacts for one in tables]),
     )
 
 

@@ -22,7 +22,7 @@ LONGEST = 6 * 3600
 _LATEST = 1e11  # seconds: some clocks count from 1970
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlayerResult:
     """One player. id: in the feed. team: name of his team. status: "done", or how far he came; reason: why he came no
     further, "" where that is not told. data: lines on what was read of him. report: his report, {} where there is none.
@@ -60,7 +60,7 @@ class TeamResult:
     colour: str = ""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class MatchResults:
     """A match. title; status: of the whole. fps: of the motions, NaN where not told. start, end: seconds on the match
     clock, NaN where not told. seconds: what the making took, by stage. lines: what was told of the data."""
@@ -93,9 +93,10 @@ def read_match_results(folder: Path) -> MatchResults:
     seconds = told.get("seconds") if isinstance(told.get("seconds"), Mapping) else {}
     stages = {str(stage): number(spent) for stage, spent in seconds.items()}
     return MatchResults(
-        _text(told.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
-        _text(told.get("status")), number(told.get("fps")), _time(told.get("from_s")), _time(told.get("to_s")),
-        (*teams.values(), *map(TeamResult, others)), players, stages, _lines(told),
+        title=_text(told.get("title")) or (" - ".join(sides) if len(sides) == 2 else Path(folder).resolve().name),
+        status=_text(told.get("status")), fps=number(told.get("fps")), start=_time(told.get("from_s")),
+        end=_time(told.get("to_s")), teams=(*teams.values(), *map(TeamResult, others)), players=players, seconds=stages,
+        lines=_lines(told),
     )  # fmt: skip
 
 
@@ -127,11 +128,11 @@ def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> Play
         status = "no report"
     ground = _text(row.get("team") or report.get("team"))
     start, per_second = _by_second(report.get("per_second"))
-    return PlayerResult(
-        name, _text(row.get("name") or report.get("name")), _text(row.get("number") or report.get("number")),
-        teams[ground].name if ground in teams else ground, status.strip() or "not told",
-        trouble or _text(row.get("reason")) or reason.strip(), _lines(row), report, start, per_second,
-    )  # fmt: skip
+    return PlayerResult(id=name, name=_text(row.get("name") or report.get("name")),
+                        number=_text(row.get("number") or report.get("number")),
+                        team=teams[ground].name if ground in teams else ground, status=status.strip() or "not told",
+                        reason=trouble or _text(row.get("reason")) or reason.strip(), data=_lines(row), report=report,
+                        start=start, per_second=per_second)  # fmt: skip
 
 
 def _by_second(told) -> tuple[float, dict[str, np.ndarray]]:

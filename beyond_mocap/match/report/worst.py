@@ -17,7 +17,7 @@ APART = 3
 """Seconds within which a player's bad seconds are one."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WorstSecond:
     """One bad second. player: who; time: its beginning, s on the match clock. figure: the one of LIMITS that is worst
     there, value in its unit, times: over its limit. other: the player into whom he runs, None where nobody is told."""
@@ -49,7 +49,7 @@ def worst_seconds(players: Sequence[PlayerResult], most: int = MOST) -> tuple[Wo
         if any(_same(one, player, time, figure, value) for one in found):
             continue
         other = _other(players, player, time, value) if figure == "overlap_m" else None
-        found.append(WorstSecond(player, time, figure, value, times, other))
+        found.append(WorstSecond(player=player, time=time, figure=figure, value=value, times=times, other=other))
         if len(found) == most:
             break
     return tuple(found)

@@ -41,7 +41,7 @@ _COLLAR = np.cos(np.radians(50.0))
 _BALL, _LOWEST_ANKLE = 0.022, 0.06
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Anatomy:
     """A skeleton's segments.
 
@@ -173,10 +173,9 @@ class _Study:
             if limb.upper_arm is not None:
                 self._arm(limb)
         still = np.stack([_mean_rotation(self.local[:, joint], self.weight) for joint in range(len(self.skeleton))])
-        return Anatomy(
-            self.skeleton, self.body, frozen_array(self.axes), frozenset(self.known), frozen_array(still),
-            self._leg_length(), self._ankle_height(), _BALL * self._leg_length(),
-        )
+        return Anatomy(skeleton=self.skeleton, body=self.body, axes=frozen_array(self.axes),
+                       known=frozenset(self.known), still=frozen_array(still), leg=self._leg_length(),
+                       ankle=self._ankle_height(), ball=_BALL * self._leg_length())
 
     def _trunk(self) -> None:
         body = self.body

@@ -32,7 +32,7 @@ _SOLE_SLOPE = np.radians(22.0)
 _BALL_HEIGHT = 0.022
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Neutral:
     """A skeleton in its neutral stance.
 
@@ -223,14 +223,14 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
     ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height
     positions = places - np.array([middle[0], middle[1], ground])
     return Neutral(
-        skeleton,
-        frozen_array(world),
-        frozen_array(positions),
-        leg,
-        ankle_height,
-        frozen_array(ball),
-        0.065 * leg,
-        float(np.mean(tips)) if tips else 0.075 * leg,
+        skeleton=skeleton,
+        rotations=frozen_array(world),
+        positions=frozen_array(positions),
+        leg=leg,
+        ankle_height=ankle_height,
+        ball=frozen_array(ball),
+        heel=0.065 * leg,
+        tip=float(np.mean(tips)) if tips else 0.075 * leg,
     )
 
 

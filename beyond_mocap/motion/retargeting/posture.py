@@ -23,7 +23,7 @@ _SOFT = 0.003
 _X, _Y, _Z = np.eye(3)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Posture:
     """T frames of a body, metres and radians, world Z up.
 
@@ -158,7 +158,7 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
     top = hip_joints(posture, neutral)[:, side]
     ankle = posture.ankles[:, side]
     pole = knee_pole(posture, top, side)
-    knee, end, hinge = limb.bend(top, ankle, np.array(upper), np.array(lower), pole, _SOFT)
+    knee, end, hinge = limb.bend(top, ankle, np.array(upper), lower=np.array(lower), pole=pole, soft=_SOFT)
     thigh = limb.bone_frame(unit_vectors(knee - top, -_Z), hinge)
     shank = limb.bone_frame(unit_vectors(end - knee, -_Z), hinge)
     foot = foot_rotation(posture.feet[:, side])

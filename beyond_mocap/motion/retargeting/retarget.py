@@ -208,7 +208,9 @@ class _Transfer:
         goal = _in_reach(hip, ankle, goal, upper + lower)
         pole = self._pole(mine, hip, knee, ankle, _bend_height(np.linalg.norm(goal - hip, axis=1), upper, lower))
         swing = quaternion.between(ankle - hip, goal - hip)
-        new_knee, new_ankle, _ = limb.bend(hip, goal, upper, lower, quaternion.rotate(swing, pole), 1e-9)
+        new_knee, new_ankle, _ = limb.bend(
+            hip, goal, upper, lower=lower, pole=quaternion.rotate(swing, pole), soft=1e-9,
+        )
         thigh = quaternion.between(knee - hip, new_knee - hip)
         shank = quaternion.between(ankle - knee, new_ankle - new_knee)
         self.wanted[theirs.upper_leg] = quaternion.multiply(thigh, self.wanted[theirs.upper_leg])

@@ -32,7 +32,7 @@ _LEAN = 0.3  # seconds whose slope is the velocity next to a gap
 _LONGEST_GAP = 3600.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class DataReport:
     """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
     rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,
@@ -70,7 +70,8 @@ def clean(track: Track) -> tuple[Track, DataReport]:
     outlier[known], snaps = _outliers(times[known], positions[known])
     believed = known & ~outlier
     positions = _bridge(times, positions, believed)
-    cleaned = Track(times, positions, ball, np.isfinite(ball[:, 2]), ~known, outlier, track.name)
+    cleaned = Track(times, positions, ball, ball_height_known=np.isfinite(ball[:, 2]), filled=~known, outlier=outlier,
+                    name=track.name)
     return cleaned, _report(cleaned, notes, snaps, dropped, merged)
 
 
@@ -163,9 +164,12 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 5:
         return wrong
-    off = _off_line(times[1:-1], positions[1:-1], times[:-2], positions[:-2], times[2:], positions[2:])
+    off = _off_line(times[1:-1], positions[1:-1], times[:-2], place_a=positions[:-2], time_b=times[2:],
+                    place_b=positions[2:])
     first, last = (
-        _off_line(times[i], positions[i], times[j], positions[j], times[k], positions[k]) for i, j, k in _ENDS
+        _off_line(
+            times[i], positions[i], times[j], place_a=positions[j], time_b=times[k], place_b=positions[k],
+        ) for i, j, k in _ENDS
     )
     beside = np.concatenate([[first], off, [last]])
     far = off > _SPIKE + _HARDEST / 8.0 * (times[2:] - times[:-2]) ** 2

@@ -69,7 +69,7 @@ class Track:
         return float(np.median(steps)) if len(steps) else np.nan
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class SampledTrack:
     """A track at an even rate, T frames; frame 0 is the track's first time. Arrays are read-only.
 

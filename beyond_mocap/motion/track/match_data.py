@@ -49,7 +49,7 @@ class Half:
     end: float
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Match:
     """Everybody's samples, N times and P players, as the feed has them (not cleaned).
 

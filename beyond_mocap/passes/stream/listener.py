@@ -43,7 +43,7 @@ _MEASURED = 60
 _alive: weakref.WeakSet[Listener] = weakref.WeakSet()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Arrived:
     """A frame that came in. number: counts up from 1. time: s of the monotonic clock when it was here. sent: s of the
     same clock when it was sent, or None. values (C,): as the stream has them; rows: how they become poses."""
@@ -55,7 +55,7 @@ class Arrived:
     rows: BvhRows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Status:
     """How a stream does. state: "waiting" (nothing yet), "receiving", "stalled", "ended" (who sent has gone), "failed",
     "stopped". frames: in all; rate: frames a second, lately; quiet: seconds since the last frame; way: seconds that
@@ -159,7 +159,8 @@ class Listener:
         if state == "receiving" and quiet > STALLED:
             state = "stalled"
         way = statistics.median(ways) if ways else None
-        return Status(state, count, rate, quiet, way, self.stream.rubbish, self._line(state, rate, quiet))
+        return Status(state=state, frames=count, rate=rate, quiet=quiet, way=way, rubbish=self.stream.rubbish,
+                      line=self._line(state, rate, quiet))
 
     def _line(self, state: str, rate: float, quiet: float) -> str:
         what = f"{_SPOKEN[self.protocol]} port {self.port}"
@@ -257,7 +258,8 @@ class Listener:
                 self._count += 1
                 if self._ring and frame.rows is not self._ring[-1].rows:
                     self._ring.clear()  # another body
-                self._ring.append(Arrived(self._count, now, _clock(frame.sent, now), frame.values, frame.rows))
+                self._ring.append(Arrived(number=self._count, time=now, sent=_clock(frame.sent, now),
+                                          values=frame.values, rows=frame.rows))
                 while now - self._ring[0].time > self.seconds:
                     self._ring.popleft()
             self._state = "receiving"

@@ -92,10 +92,8 @@ class Construction:
         skeleton, root, ball = self.library.skeleton, planted.root, track.ball
         if size != 1.0:  # the ball is as large for a tall player as for a short one
             skeleton, root, ball = skeleton.scaled(size), root * size, real_ball(ball, size)
-        struck = strike(
-            skeleton, root, planted.rotations, taken.standing.any(axis=2), ball, self.touches, self.plan.fps,
-            measured=track.ball_measured, height_known=height,
-        )
+        struck = strike(skeleton, root, planted.rotations, contacts=taken.standing.any(axis=2), ball=ball,
+                        touches=self.touches, fps=self.plan.fps, measured=track.ball_measured, height_known=height)
         root, ball = (struck.root, struck.ball) if size == 1.0 else (struck.root / size, struck.ball / size)
         return replace(planted, root=root, rotations=struck.rotations), ball
 
@@ -116,7 +114,8 @@ class Construction:
     def _turn_to_ball(self, heading: np.ndarray) -> np.ndarray:
         ground = root_with_sway(self.track.positions, self.smooth.sway, heading)
         root, pose = np.column_stack([ground, self.smooth.height]), apply_heading(self.smooth.pose, heading)
-        return turned_to_ball(self.library.skeleton, root, pose, self.track.ball, self.touches, self.track.fps)
+        return turned_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
+                              fps=self.track.fps)
 
     def _pull_to_track(self, ground: np.ndarray) -> np.ndarray:
         window = self.plan.asked.root_window
@@ -127,7 +126,8 @@ class Construction:
     def _lean(self, pose: np.ndarray) -> np.ndarray:
         """(T, J, 4) of a body that leans into the track's curves as far as its source does not."""
         track, smooth = self.track, self.smooth
-        lean = missing_lean(track.speed, track.direction, smooth.velocity, smooth.turn, smooth.seams, self.plan.fps)
+        lean = missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn, seams=smooth.seams,
+                            fps=self.plan.fps)
         return banked(self.library.skeleton, pose, track.direction, lean)
 
     def _plant_feet(self, root: np.ndarray, pose: np.ndarray) -> tuple[Planted, Steps]:
@@ -138,7 +138,7 @@ class Construction:
         for touch in self.touches:
             free &= (at < touch.frame - touch.entry) | (at > touch.frame + touch.leave)
         kept = None if self.old is None else self.old.kept_steps()
-        taken = steps(skeleton, root, pose, standing, fps, kept, free)
+        taken = steps(skeleton, root, pose, standing=standing, fps=fps, given=kept, free=free)
         root = root + np.column_stack([(1.0 - share)[:, None] * taken.sway, np.zeros(len(root))])
         root, pose = self._absorb_foot_slide(root, taken, 1.0 - share)
         return plant(skeleton, root, pose, taken.standing, fps, moves=taken.moves), taken

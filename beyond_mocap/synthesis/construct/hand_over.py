@@ -44,7 +44,7 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
         moved, turned = _offsets([values[:, limb.foot] for values in (*fresh, *stays)], share, carries, fps)
         chain, foot = leg(limb), quaternion.multiply(turned, fresh[1][:, limb.foot])
         place = fresh[0][:, limb.foot] + moved
-        place[:, 2] += _sunk(skeleton, limb, place, foot, [fresh[0], stays[0]], share)
+        place[:, 2] += _sunk(skeleton, limb, place, foot=foot, motions=[fresh[0], stays[0]], share=share)
         away = place - body.places[:, limb.foot]
         rotations = limb_carried(body, Resting.of(body, chain), away, rotations=rotations)
         above = quaternion.inverse(world_rotation(skeleton, rotations, skeleton.parents[limb.foot]))

@@ -20,7 +20,9 @@ back."""
 
 def key_results(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown) -> tuple[KeyResult, ...]:
     """How every key moment of an order came out in `played`, whose frames are at `fps`."""
-    return tuple(_key_result(library, fps, order, edit, played, number) for number in range(len(order.keys)))
+    return tuple(_key_result(
+        library, fps, order, edit=edit, played=played, number=number,
+    ) for number in range(len(order.keys)))
 
 
 def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
@@ -38,7 +40,8 @@ def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, pla
         shown = placed.key.frame
     source = library.clips[clip]
     instead = words if key.used_instead and not key.choices else key.used_instead
-    return KeyResult(key.asked, at, source.path, shown, source.mirrored, words, instead)
+    return KeyResult(asked=key.asked, frame=at, clip=source.path, clip_frame=shown, mirrored=source.mirrored,
+                     words=words, used_instead=instead)
 
 
 def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:

@@ -34,7 +34,8 @@ def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: 
     found = plant(skeleton, swayed, taken.rotations, taken.standing, fps, moves=taken.moves, levels=False)
     share = old_share(high - low, (first + joins - low, end - joins - low), joins)
     share[~inside] = 1.0
-    new = handed_over(skeleton, (found.root, found.rotations), (root, rotations), share, taken.standing, fps)
+    new = handed_over(skeleton, (found.root, found.rotations), (root, rotations), share=share, standing=taken.standing,
+                      fps=fps)
     changed = pose[0].copy(), pose[1].copy()
     for whole, part in zip(changed, new):
         whole[first:end] = part[first - low : end - low]

@@ -75,7 +75,7 @@ UPRIGHT = 0.75
 _LEFT, _RIGHT, _ROUNDS = 0, 1, 6
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Steps:
     """What plants and labels feet. rotations (T, J, 4) local, with lifts left out; standing (T, 2, 2) bool: heels
     and toes that stand now; contacts (T, 2) bool: feet that stand flat, as they did in the source; stepped (T, 2)
@@ -94,9 +94,8 @@ class Steps:
         """No steps at all; rotations (T, J, 4), standing (T, 2, 2) bool."""
         count = len(standing)
         nothing = np.zeros((count, 2))
-        return Steps(
-            rotations, standing, standing.all(axis=2), nothing.astype(bool), np.zeros((count, 2, 4)), nothing
-        )
+        return Steps(rotations=rotations, standing=standing, contacts=standing.all(axis=2),
+                     stepped=nothing.astype(bool), moves=np.zeros((count, 2, 4)), sway=nothing)
 
 
 def steps(
@@ -120,7 +119,9 @@ def steps(
     places, world = pose_kinematics(skeleton, root, rotations)
     heading = np.unwrap(quaternion.yaw(rotations[:, 0]))
     limbs = (body.left, body.right)
-    feet = [_Foot(limb, places, world, root, heading, standing[:, side]) for side, limb in enumerate(limbs)]
+    feet = [_Foot(
+        limb, places, world, root=root, heading=heading, standing=standing[:, side],
+    ) for side, limb in enumerate(limbs)]
     upright = root[:, 2] > UPRIGHT * np.median(root[:, 2])
     speed = np.linalg.norm(np.gradient(zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
     stepped = none.stepped if given is None else given
@@ -137,7 +138,8 @@ def steps(
         hips = places[:, body.left.upper_leg] - places[:, body.right.upper_leg]
         left = hips[:, 0] + 1j * hips[:, 1]
         moves[..., :2] = _apart(plan, stepped, left / np.maximum(np.abs(left), 1e-9))
-    return Steps(rotations, stands & ~swings[:, :, None], none.contacts & ~stepped, stepped, moves, sway)
+    return Steps(rotations=rotations, standing=stands & ~swings[:, :, None], contacts=none.contacts & ~stepped,
+                 stepped=stepped, moves=moves, sway=sway)
 
 
 class _Foot:

@@ -18,7 +18,7 @@ from . import pieces
 from .played import Played
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Moment:
     """How one key moment was served.
 
@@ -64,13 +64,15 @@ def _moment(played: Played, key: KeyMoment, number: np.ndarray, result, library:
     instead = _instead(key, words if found is None else found.words, result)
     if found is None:
         known = played.clip[frame] >= 0
-        shown = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
-        return Moment(key, frame, *shown, np.nan, words, frame, frame, instead)
+        clip, source = (played.clips[played.clip[frame]], float(played.clip_frame[frame])) if known else (None, None)
+        return Moment(asked=key, frame=frame, clip=clip, clip_frame=source, played_at=np.nan, words=words, entry=frame,
+                      exit=frame, used_instead=instead)
     inside = run[(played.clip_frame[run] >= found.start) & (played.clip_frame[run] <= found.end)]
     entry, leave = (inside[0], inside[-1]) if len(inside) else (frame, frame)
     at = crossing(played.clip_frame[run], played.times[run], found.frame)
     clip = played.clips[played.clip[run[0]]]
-    return Moment(key, frame, clip, found.frame, at, words, int(entry), int(leave), instead)
+    return Moment(asked=key, frame=frame, clip=clip, clip_frame=found.frame, played_at=at, words=words,
+                  entry=int(entry), exit=int(leave), used_instead=instead)
 
 
 def _frame_at(played: Played, frame: float) -> int:

@@ -20,7 +20,7 @@ from ..take import KeyResult, Take
 from .feet import foot_joints
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Played:
     """One player's take as evaluation sees it.
 
@@ -125,7 +125,8 @@ def played_from_tables(
     count = len(motion)
     if provenance is None:
         unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
-        return Played(motion, start_time, (), unknown, nowhere, plain, None, foot_contacts.detect(motion), ball)
+        return Played(motion=motion, start_time=start_time, clips=(), clip=unknown, clip_frame=nowhere, mirrored=plain,
+                      words=None, contacts=foot_contacts.detect(motion), ball=ball)
     if len(provenance.clip) != count:
         raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
     clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)

@@ -72,7 +72,7 @@ def edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple
     for number, seam in enumerate(seams):
         low = max([0, *seams[number - 1 : number].tolist(), *[f + 1 for f in fixed if f < seam]])
         high = min([len(clip), *seams[number + 1 : number + 2].tolist(), *[f for f in fixed if f >= seam]])
-        _move(library, clip, frame, int(seam), low, high)
+        _move(library, clip, frame, seam=int(seam), low=low, high=high)
     return EditList(clip, frame, find_seams(clip, frame), keys)
 
 

@@ -45,9 +45,13 @@ def undragged(
     """
     first, end = slots
     a, b = first, end
-    while at - edges[a + 1] >= around and drags(library, wanted, at, key, rate, edges[a], edges[a + 1]):
+    while at - edges[a + 1] >= around and drags(
+        library, wanted, at, key=key, rate=rate, low=edges[a], high=edges[a + 1],
+    ):
         a += 1
-    while edges[b - 1] - at >= around and drags(library, wanted, at, key, rate, edges[b - 1], edges[b]):
+    while edges[b - 1] - at >= around and drags(
+        library, wanted, at, key=key, rate=rate, low=edges[b - 1], high=edges[b],
+    ):
         b -= 1
     return list(dict.fromkeys([(first, end), (a, end), (first, b), (a, b)]))
 
@@ -71,7 +75,8 @@ def _left_out_of(library: Library, wanted: Wanted, edit: EditList, key: Key, ask
     start, words = float(wanted.track.times[0]), " ".join(asked.asked.words)
     told = []
     for name, first, end, inside in (("entry", whole[0], low, low > 0), ("exit", high, whole[1], high < len(edit))):
-        if inside and end - first >= _TOLD and drags(library, wanted, asked.frame, key, rate, first, end):
+        if inside and end - first >= _TOLD and drags(library, wanted, asked.frame, key=key, rate=rate, low=first,
+                                                     high=end):
             when = start + first / library.fps, start + end / library.fps
             lacks = f"the {name} of the clip for '{words}' is left out, since it stands while the track does not"
             told.append(TimedLine(f"{when[0]:.1f}-{when[1]:.1f} s: {lacks}", when))

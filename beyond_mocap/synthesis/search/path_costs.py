@@ -39,7 +39,7 @@ def cheapest(
     cost_of: (n,) costs of a part of the pairs.
     """
     near = _nearest(speeds, speed, looked_at)
-    part, cost = _promising(cost_of, speeds, speed, weight, near, count)
+    part, cost = _promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
     best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
     return part.start + best, cost[best]
 
@@ -169,7 +169,7 @@ class PathCosts:
             some = pairs.part(part)
             return _added(self._played_terms(first, end, some)) + still[some.frame]
 
-        best, cost = cheapest(cost_of, pairs.speed, speed, self.weights.speed, looked_at, count)
+        best, cost = cheapest(cost_of, pairs.speed, speed, weight=self.weights.speed, looked_at=looked_at, count=count)
         return pairs.number[best], pairs.frame[best], cost
 
     def _words(self, first: int, end: int) -> frozenset[str]:
@@ -178,7 +178,8 @@ class PathCosts:
     def _played_terms(self, first: int, end: int, pairs: Pairs) -> Iterator[Term]:
         """How far pairs (K,) are from what the track asks, the rate, and the player's taste."""
         turn = pairs.turn * np.float32((end - first) / SLOT)
-        yield from self._motion_terms(first, end, pairs.speed, turn, pairs.offset, pairs.long_stance)
+        yield from self._motion_terms(first, end, pairs.speed, turn=turn, offset=pairs.offset,
+                                      long_stance=pairs.long_stance)
         yield "rate", self._rate_cost[pairs.number]
         if self.wanted.taste is not None:
             yield "variety", self.wanted.taste.cost(first, pairs.frame)
@@ -224,7 +225,7 @@ class PathCosts:
         speed = np.linalg.norm(path[1] - path[0], axis=1) * self.library.fps / length
         middle = self.inside((a + b) / 2.0)
         yield from self._motion_terms(
-            first, end, speed, turn, self.offer.offset[middle], self.offer.long_stance[middle]
+            first, end, speed, turn=turn, offset=self.offer.offset[middle], long_stance=self.offer.long_stance[middle]
         )
         held = np.maximum(low - start, 0) + np.maximum(start + rate * length - high, 0)
         off = np.abs(rate - 1.0)

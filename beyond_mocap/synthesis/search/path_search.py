@@ -152,7 +152,8 @@ class PathSearch:
     def _first(self) -> States:
         to = self.offered(0)
         recent = np.full((len(to.clip), MEMORY_SLOTS), -1)
-        return self._kept(States(to.clip, to.start, to.rate, to.cost, np.zeros(len(to.clip), int), to.piece, recent))
+        return self._kept(States(to.clip, to.start, to.rate, cost=to.cost, back=np.zeros(len(to.clip), int),
+                                 piece=to.piece, recent=recent))
 
     def _arriving(self) -> tuple[States, int]:
         """The one state from which a stretch sets out, the frame before, with what was shown up to there; and its
@@ -162,7 +163,8 @@ class PathSearch:
         shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
         recent = self.offer.bucket[self.costs.inside(shown)][None, :]
         nothing = np.zeros(1, int)
-        return States(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), nothing, nothing - 1, recent), 1
+        return States(edit.clip[at], edit.frame[at], _steps(edit, at), cost=np.zeros(1), back=nothing,
+                      piece=nothing - 1, recent=recent), 1
 
     def _leaving(self, states: States, shown: int) -> States:
         """The last states, of `shown` frames, with what it costs to come to the frame that stays behind the stretch."""
@@ -182,7 +184,8 @@ class PathSearch:
             known = np.concatenate([np.zeros(0), *(cost for _, _, _, cost, _, _ in going_on)])
             options += [self._entered(slot, before, ends, free, known), *going_on]
         clip, start, rate, cost, back, piece = (np.concatenate(parts) for parts in zip(*options))
-        return self._kept(States(clip, start, rate, cost, back, piece, np.roll(before.recent[back], -1, axis=1)))
+        return self._kept(States(clip, start, rate, cost=cost, back=back, piece=piece,
+                                 recent=np.roll(before.recent[back], -1, axis=1)))
 
     def _kept(self, states: States) -> States:
         """The cheapest of those that are free and of those bound to a key moment, as many of each as the beam keeps,
@@ -251,7 +254,7 @@ class PathSearch:
     def ways(self, before: States, free: np.ndarray, ends: np.ndarray) -> Ways:
         """The ways on from the states `free` (B,), which end at library frames `ends` (B,)."""
         seen = self._seen(before.recent[free])
-        return Ways(self.costs, before.clip[free], ends, before.rate[free], before.cost[free], seen)
+        return Ways(self.costs, before.clip[free], ends, rate=before.rate[free], cost=before.cost[free], seen=seen)
 
     def _seen(self, recent: np.ndarray) -> np.ndarray:
         """(B, buckets) whether a state has lately shown a bucket of frames or its neighbours; recent (B, M)."""
@@ -292,7 +295,8 @@ class PathSearch:
             state = int(states.back[state])
         keys = tuple(placed[number] for number in sorted(placed))
         if self.between:
-            return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip, frame, keys)
+            return replaced(self.between.edit, int(self.edges[0]), int(self.edges[-1]), clip=clip, frame=frame,
+                            keys=keys)
         return EditList(clip, frame, find_seams(clip, frame), keys)
 
 

@@ -91,7 +91,7 @@ def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
         low = 0 if before is None else _edge_between(edges, wanted, before, number)
         high = len(edges) - 1 if after is None else _edge_between(edges, wanted, number, after)
         if low <= inside[number] < high:
-            rows += _pieces_of(library, wanted, edges, number, low, high)
+            rows += _pieces_of(library, wanted, edges, number=number, low=low, high=high)
     columns = zip(*rows) if rows else [()] * 7
     kinds = (int, int, int, float, int, int, float)
     return Pieces(*(np.array(column, dtype=kind) for column, kind in zip(columns, kinds)))
@@ -109,7 +109,8 @@ def _pieces_of(library: Library, wanted: Wanted, edges: np.ndarray, number: int,
             end = int(np.searchsorted(edges, key.frame + leave / rate - _TRIMMED))
             first, end = int(np.clip(first, low, here)), int(np.clip(end, here + 1, high))
             around = AROUND / rate - _TRIMMED
-            for a, b in undragged(library, wanted, edges, key.frame, option, rate, (first, end), around):
+            for a, b in undragged(library, wanted, edges, at=key.frame, key=option, rate=rate, slots=(first, end),
+                                  around=around):
                 start = pool_frame(library, option) - rate * (key.frame - edges[a])
                 rows.append((number, choice, option.clip, rate, a, b, start))
     return rows

@@ -34,7 +34,7 @@ PAPERS_OMEGA = 4.0
 Words = frozenset[str] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class WantedKey:
     """A key moment: what was asked, its frame (fractional, at the library's rate), the clips' key moments that may
     serve it (empty: locomotion stands in), the words used where the asked ones are lacking, whether the feed measured
@@ -48,7 +48,7 @@ class WantedKey:
     rates: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Wanted:
     """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
     avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style:
@@ -95,7 +95,9 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     timeline = fill(plan.timeline, track.times, automatic)
     allowed = np.array([asked_for.mirror or not clip.mirrored for clip in library.clips])
     warnings: list[str] = []
-    keys = tuple(_key(library, moment, track, gait, allowed, asked_for.nearest, warnings) for moment in timeline.keys)
+    keys = tuple(_key(
+        library, moment, track, gait=gait, allowed=allowed, go_on=asked_for.nearest, warnings=warnings,
+    ) for moment in timeline.keys)
     known = plan.track.ball_height_known
     nearest_sample = [int(np.argmin(np.abs(plan.track.times - key.asked.in_force))) for key in keys]
     keys = tuple(replace(key, ball_height_known=bool(known[at])) for key, at in zip(keys, nearest_sample))
@@ -105,8 +107,8 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
     own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, off_style=off_style,
-                  weak_foot=weak_foot, taste=own)
+    return Wanted(track=track, asked=tuple(asked), gait=gait, timeline=timeline, keys=keys, allowed=allowed,
+                  warnings=tuple(warnings), avoided=avoided, off_style=off_style, weak_foot=weak_foot, taste=own)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:
@@ -130,7 +132,8 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
         usable, made = _without(moment, usable, made, warnings)
     choices = serving(usable, moment.words)
     if choices:
-        return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), None)
+        return WantedKey(asked=moment, frame=frame, choices=(*choices, *standing_in(choices, made, moment.words)),
+                         used_instead=None)
     offered = nearest_words(usable, moment.words)
     line = f"line {moment.line}, " if moment.line else ""
     lacks = f"the library has no clip for '{' '.join(moment.words)}'"
@@ -143,7 +146,8 @@ def _key(library, moment: KeyMoment, track, gait, allowed, go_on: bool, warnings
     used = spoken(choices[0].words) if choices else gait_words
     instead = " ".join(used) if choices else "locomotion goes on there"
     warnings.append(TimedLine(f"{text}; used instead: {instead}", (moment.time, moment.time)))
-    return WantedKey(moment, frame, (*choices, *standing_in(choices, made, moment.words)), used)
+    return WantedKey(asked=moment, frame=frame, choices=(*choices, *standing_in(choices, made, moment.words)),
+                     used_instead=used)
 
 
 def _without(moment: KeyMoment, usable: tuple[Key, ...], made: tuple[Key, ...], warnings: list[str]):

@@ -63,7 +63,7 @@ class Other:
     more: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Reason:
     """One uncut piece. first, end: frames at the library's rate. clip: index in the library. path, mirrored; shown:
     first and last frame in the clip's own rate; rate: played / recorded speed. costs: part -> what it cost over the
@@ -116,7 +116,7 @@ def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, 
         near = (
             tuple(_others(search, way, mine[0], sum(unary[0].values()) + sum(seam.values()), others)) if others else ()
         )
-        found.append(_reason(library, edit, first, end, costs, _summed([seam]), near))
+        found.append(_reason(library, edit, first, end=end, costs=costs, seam=_summed([seam]), others=near))
     return found
 
 
@@ -139,11 +139,11 @@ def block_reasons(library: Library, wanted: Wanted, edit: EditList, alpha: float
             seam["pose"] = float(
                 weight * distances(after, windows(frames, edit.clip[[first]], place[[first]], size))[0, 0]
             )
-        found.append(_reason(library, edit, first, end, {"words": alpha * float(np.sum(blocks))}, seam))
+        found.append(_reason(library, edit, first, end=end, costs={"words": alpha * float(np.sum(blocks))}, seam=seam))
     return found
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Way:
     """What was chosen, slot by slot: edges (S + 1,); clip, start, rate, piece (S,), as `path_search.States` has
     them."""
@@ -166,7 +166,7 @@ def _way_of(search: PathSearch, edit: EditList) -> _Way:
     one = frame[later] - frame[low]
     alone = later == low
     rate = np.where(alone, 1.0, one)
-    return _Way(edges, edit.clip[low], frame[low], rate, piece_at[low])
+    return _Way(edges=edges, clip=edit.clip[low], start=frame[low], rate=rate, piece=piece_at[low])
 
 
 def _put_back(search: PathSearch, edit: EditList, placed, frame: np.ndarray, piece_at: np.ndarray) -> None:
@@ -233,7 +233,8 @@ def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.
     recent = np.full(MEMORY_SLOTS, -1)
     recent[MEMORY_SLOTS - len(starts) :] = search.offer.bucket[search.costs.inside(starts)]
     one, nothing = slice(slot - 1, slot), np.zeros(1, int)
-    state = States(way.clip[one], way.start[one], way.rate[one], np.zeros(1), nothing, way.piece[one], recent[None])
+    state = States(way.clip[one], way.start[one], way.rate[one], cost=np.zeros(1), back=nothing, piece=way.piece[one],
+                   recent=recent[None])
     return state, state.start + state.rate * (way.edges[slot] - way.edges[slot - 1])
 
 
@@ -267,8 +268,8 @@ def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam,
     shown = (edit.frame[[first, end - 1]] - library.frames.first[edit.clip[first]]) * own
     rate = (edit.frame[end - 1] - edit.frame[first]) / (end - 1 - first) if end - first > 1 else 1.0
     return Reason(
-        first, end, int(edit.clip[first]), clip.path, clip.mirrored, (float(shown[0]), float(shown[1])), float(rate),
-        costs, seam, others,
+        first=first, end=end, clip=int(edit.clip[first]), path=clip.path, mirrored=clip.mirrored,
+        shown=(float(shown[0]), float(shown[1])), rate=float(rate), costs=costs, seam=seam, others=others,
     )  # fmt: skip
 
 

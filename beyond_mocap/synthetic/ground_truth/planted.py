@@ -23,7 +23,7 @@ _HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # metres of the ball's centre: above the
 _HOLD = 9.0  # seconds over which a player leaves his place for a ball and comes back
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class PlantedTouch:
     """Somebody changes the ball's course: time s, player (id), part ("foot", "chest", "head", "hand"), word ("kick",
     "receive", "dribble", "header", "throw-in"); position (3,) m of the ball's centre, before and after (3,) m/s."""
@@ -187,7 +187,8 @@ class _Play:
         """The touch is made: the ball leaves, and goes on until `time`."""
         velocity, who = np.array(flight.launch.velocity), self.match.ids[self.holder]
         self.match.touches.append(
-            PlantedTouch(self.time, who, self.part, self.word, self.position.copy(), self.before.copy(), velocity)
+            PlantedTouch(time=self.time, player=who, part=self.part, word=self.word, position=self.position.copy(),
+                         before=self.before.copy(), after=velocity)
         )
         self.match.flights.append(flight)
         self.time = time

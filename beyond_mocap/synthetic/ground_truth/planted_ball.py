@@ -41,7 +41,7 @@ class PlantedBall:
     grip: tuple[float, float, float] | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class BallTruth:
     """What came out: places (T, 3) metres of the ball's centre and marker (T, 3) of the marker, without noise.
 
@@ -86,7 +86,8 @@ def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
     places = np.where(flying[:, None], flown, held)
     spun = quaternion.multiply(quaternion.from_rotation_vector(after[:, None] * spin), turn)
     marker = places + quaternion.rotate(np.where(flying[:, None], spun, turns), outward)
-    return BallTruth(asked, places, marker, position, velocity, spin, grip)
+    return BallTruth(asked=asked, places=places, marker=marker, position=position, velocity=velocity, spin=spin,
+                     grip=grip)
 
 
 def _at_release(times, held, turns, release: float):

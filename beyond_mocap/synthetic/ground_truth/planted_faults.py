@@ -97,10 +97,8 @@ class Faults:
 
     def faulty(self) -> tuple[MarkerTrial, tuple[Fault, ...]]:
         """The trial as it came out, and what was done to it in the order of time."""
-        trial = MarkerTrial(
-            tuple(self.labels), self.positions, self.trial.fps, start=self.trial.start, name=self.trial.name,
-            subject=self.trial.subject,
-        )
+        trial = MarkerTrial(labels=tuple(self.labels), positions=self.positions, fps=self.trial.fps,
+                            start=self.trial.start, name=self.trial.name, subject=self.trial.subject)
         return trial, tuple(sorted(self.done, key=lambda fault: (fault.start, fault.labels)))
 
     def _stretch(self, seconds: float) -> tuple[int, int]:

@@ -12,7 +12,7 @@ _SLOW = 0.4  # seconds over which the ball's error hangs together
 _PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # the players' errors: seconds, metres; metres between samples
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Feed:
     """N samples. times (N,) s. ball (N, 3) m, z NaN where there are no heights. positions (P, N, 2) m of players `ids`
     in `teams`. filled, wrong (N,) bool: made at constant velocity, put elsewhere. length, width of the pitch, m."""
@@ -44,13 +44,14 @@ def sampled(
     ball = match.ball_at(times) - np.array([0.0, 0.0, match.ball.radius])
     players = match.players_at(times)
     measured = ball + _slow_noise(rng, ball.shape, _SLOW * fps, 0.87 * noise) + rng.normal(0.0, 0.5 * noise, ball.shape)
-    wrong = _snapped(match, times, measured, players, snaps, rng)
-    made = _filled(match, times, measured, ball, filled, rng)
+    wrong = _snapped(match, times, measured, players=players, share=snaps, rng=rng)
+    made = _filled(match, times, measured, ball=ball, share=filled, rng=rng)
     measured[:, 2] = np.maximum(measured[:, 2], 0.0) if heights else np.nan
     seen = players + _slow_noise(rng, players.shape, _PLAYERS_SLOW * fps, _PLAYERS_NOISE, axis=1)
     seen += rng.normal(0.0, _JITTER, seen.shape)
     teams = tuple(TEAMS[i // 11] for i in range(len(match.ids)))
-    return Feed(times, measured.round(2), seen.round(2), match.ids, teams, made, wrong & ~made, fps)
+    return Feed(times=times, ball=measured.round(2), positions=seen.round(2), ids=match.ids, teams=teams, filled=made,
+                wrong=wrong & ~made, fps=fps)
 
 
 def _slow_noise(rng, shape, samples: float, size: float, axis: int = 0) -> np.ndarray:

@@ -25,7 +25,7 @@ from .planted_skin import on_skin
 _STATIC_SECONDS, _STATIC_FPS = 3.0, 100.0
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Planted:
     """A trial and its truth.
 
@@ -93,15 +93,16 @@ def planted(
     thrown = planted_ball(truth, ball) if ball else None
     if thrown:
         labels, clean = (*labels, ball.label), np.concatenate([clean, _seen_ball(thrown, truth, noise, rng)], axis=1)
-    trial = MarkerTrial(labels, clean, motion.fps, name="planted")
+    trial = MarkerTrial(labels=labels, positions=clean, fps=motion.fps, name="planted")
     faults = Faults(trial, seed + 4)
     faults.swap(_exchangeable(markers, trial.labels), swaps)
     faults.unlabel(unlabeled)
     faults.stray(jumps)
     faults.occlude(occlusion)
     spoiled, done = faults.faulty()
-    static = MarkerTrial(markers.labels, stood, pose.fps, name="planted static")
-    return Planted(spoiled, static, truth, forward_kinematics(truth)[0], pose, markers, clean, done, thrown)
+    static = MarkerTrial(labels=markers.labels, positions=stood, fps=pose.fps, name="planted static")
+    return Planted(trial=spoiled, static=static, motion=truth, centres=forward_kinematics(truth)[0], pose=pose,
+                   markers=markers, clean=clean, faults=done, ball=thrown)
 
 
 def _seen_ball(ball: BallTruth, truth: Motion, noise: float, rng: np.random.Generator) -> np.ndarray:

@@ -40,50 +40,52 @@ class Place:
 
 
 def _head(x, y, z):
-    return Place("Head", None, 0.0, (x, y, z), 1.5, 0.1)
+    return Place("Head", None, 0.0, offset=(x, y, z), soft=1.5, wobble=0.1)
 
 
 def _trunk(x, y, z, soft=7.0):
-    return Place("Chest", "shoulders", 1.0, (x, y, z), soft, 0.35)
+    return Place("Chest", "shoulders", 1.0, offset=(x, y, z), soft=soft, wobble=0.35)
 
 
 def _arm(share, x, z, soft=9.0):
-    return Place("Arm", "ForeArm", share, (x, 0.0, z), soft, 0.5)
+    return Place("Arm", "ForeArm", share, offset=(x, 0.0, z), soft=soft, wobble=0.5)
 
 
 def _fore(share, x, y, z, soft=4.0):
-    return Place("ForeArm", "Hand", share, (x, y, z), soft, 0.3)
+    return Place("ForeArm", "Hand", share, offset=(x, y, z), soft=soft, wobble=0.3)
 
 
 def _hand(x, y, z):
-    return Place("Hand", None, 0.0, (x, y, z), 1.0, 0.1)
+    return Place("Hand", None, 0.0, offset=(x, y, z), soft=1.0, wobble=0.1)
 
 
 def _thigh(share, x, y, soft=14.0, wobble=1.0):
-    return Place("UpLeg", "Leg", share, (x, y, 0.0), soft, wobble)
+    return Place("UpLeg", "Leg", share, offset=(x, y, 0.0), soft=soft, wobble=wobble)
 
 
 def _shank(share, x, y, soft=6.0, wobble=0.5):
-    return Place("Leg", "Foot", share, (x, y, 0.0), soft, wobble)
+    return Place("Leg", "Foot", share, offset=(x, y, 0.0), soft=soft, wobble=wobble)
 
 
 def _foot(to, x, y, z):
-    return Place("Foot", to, 1.0 if to else 0.0, (x, y, z), 2.0, 0.1)
+    return Place("Foot", to, 1.0 if to else 0.0, offset=(x, y, z), soft=2.0, wobble=0.1)
 
 
 MIDDLE = {
     "C7": _trunk(-78, 0, 45), "T7": _trunk(-98, 0, -120), "T10": _trunk(-95, 0, -195, 9.0),
     "CLAV": _trunk(62, 0, -15, 5.0), "MAN": _trunk(60, 0, -12, 5.0), "STRN": _trunk(92, 0, -150, 8.0),
     "RBAK": _trunk(-105, -95, -80, 9.0), "LBAK": _trunk(-105, 95, -80, 9.0),
-    "SACR": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
-    "P1": Place("Hips", None, 0.0, (-14, 0, -42), 5.0, 0.5), "P2": Place("Hips", None, 0.0, (-10, 36, -22), 5.0, 0.5),
-    "P3": Place("Hips", None, 0.0, (-10, -36, -22), 5.0, 0.5),
+    "SACR": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
+    "P1": Place(
+        "Hips", None, 0.0, offset=(-14, 0, -42), soft=5.0, wobble=0.5,
+    ), "P2": Place("Hips", None, 0.0, offset=(-10, 36, -22), soft=5.0, wobble=0.5),
+    "P3": Place("Hips", None, 0.0, offset=(-10, -36, -22), soft=5.0, wobble=0.5),
 }  # fmt: skip
 SIDED = {
     "FHD": _head(95, 62, 95), "BHD": _head(-85, 62, 80), "EAR": _head(5, 80, 50),
-    "SHO": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
-    "ACR": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
-    "SH": Place("Shoulder", "Arm", 1.0, (0, -6, 50), 8.0, 0.4),
+    "SHO": Place("Shoulder", "Arm", 1.0, offset=(0, -6, 50), soft=8.0, wobble=0.4),
+    "ACR": Place("Shoulder", "Arm", 1.0, offset=(0, -6, 50), soft=8.0, wobble=0.4),
+    "SH": Place("Shoulder", "Arm", 1.0, offset=(0, -6, 50), soft=8.0, wobble=0.4),
     "UPA": _arm(0.5, 8, 50), "UPB": _arm(0.35, -38, 22), "ARM": _arm(0.55, -8, 48),
     "ELB": _arm(1.0, 0, 43, 5.0), "MELB": _arm(1.0, 0, -43, 5.0), "ELBM": _arm(1.0, 0, -43, 5.0),
     "FRM": _fore(0.45, 12, 0, 40), "FOREARM": _fore(0.5, 8, 0, 38),
@@ -100,10 +102,14 @@ SIDED = {
     "HEE": _foot(None, -52, 0, 12), "HEEL": _foot(None, -52, 0, 12), "MFS": _foot("ToeBase", -62, 6, 34),
     "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 14), "P1MT": _foot("ToeBase", 4, -38, 12),
     "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
-    "HLX": Place("ToeBase", None, 0.0, (55, -12, 14), 1.5, 0.1),
-    "ASI": Place("Hips", None, 0.0, (0, 0, 0), 6.0, 0.4), "PSI": Place("Hips", None, 0.0, (0, 0, 0), 4.0, 0.4),
+    "HLX": Place("ToeBase", None, 0.0, offset=(55, -12, 14), soft=1.5, wobble=0.1),
+    "ASI": Place(
+        "Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4,
+    ), "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
 }  # fmt: skip
-_ON_BLADE = Place("Shoulder", "Arm", 1.0, (-98, -78, -85), 9.0, 0.4)  # where shoulder blades are tracked apart
+_ON_BLADE = Place(
+    "Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4,
+)  # where shoulder blades are tracked apart
 _PIG = (
     "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
     "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
@@ -137,7 +143,7 @@ STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}
 """Markers that come off after the static trial."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Placed:
     """Markers on a skeleton: labels (M), their joints (M,), places (M, 3) metres in the joint's axes, and how soft the
     skin under them is: soft (M,) metres a radian, wobble (M,)."""
@@ -161,10 +167,9 @@ def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: floa
             continue
         place, side = found
         rows.append((label, skeleton.index(side + place.on), _at(skeleton, label, place, side, size) + shift, place))
-    return Placed(
-        tuple(row[0] for row in rows), np.array([row[1] for row in rows], int), np.array([row[2] for row in rows]),
-        np.array([row[3].soft for row in rows]) * 1e-3, np.array([row[3].wobble for row in rows]),
-    )
+    return Placed(labels=tuple(row[0] for row in rows), joint=np.array([row[1] for row in rows], int),
+                  places=np.array([row[2] for row in rows]), soft=np.array([row[3].soft for row in rows]) * 1e-3,
+                  wobble=np.array([row[3].wobble for row in rows]))
 
 
 def _place(label: str, blades: bool) -> tuple[Place, str] | None:

@@ -41,7 +41,7 @@ def answered(
     if name in LIMB_OF[:2] and settings.wrist == "given":
         number = LIMB_OF.index(name)
         given = {chains.effectors[number]: window.hands_next[..., number, :, :]}
-    return spread(chains.skeleton, after, chains.known[name], after.root, local, given, xp)
+    return spread(chains.skeleton, after, chains.known[name], root=after.root, local=local, given=given, xp=xp)
 
 
 def floating(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):
@@ -72,7 +72,9 @@ def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
         goals = (*chains.sockets[:2], chains.head)
     else:
         goals = (chains.effectors[LIMB_OF.index(name)],)
-    return xp.stack([_reached(chains, joints, turns, chains.references[name], goal, xp) for goal in goals], axis=-2)
+    return xp.stack([_reached(
+        chains, joints, turns, reference=chains.references[name], goal=goal, xp=xp,
+    ) for goal in goals], axis=-2)
 
 
 def _from_hips(chains: Chains, number: int) -> np.ndarray:
@@ -102,7 +104,7 @@ def _hips_at(chains: Chains, after: Pose, place, turn, xp) -> Pose:
             continue
         root = root - xp.matmul(above, chains.skeleton.offsets[joint])
         above = xp.matmul(above, after.local[..., joint, :, :])
-    return spread(chains.skeleton, after, chains.known["hip"], root, {}, {chains.hips: turn}, xp)
+    return spread(chains.skeleton, after, chains.known["hip"], root=root, local={}, given={chains.hips: turn}, xp=xp)
 
 
 def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> Pose:
@@ -112,7 +114,7 @@ def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> 
     after = _hips_at(chains, pose, places[..., 0, :], own[chains.hips], xp)
     for name in HIERARCHY[1:]:
         given = {joint: own[joint] for joint in chains.members[name]}
-        after = spread(chains.skeleton, after, chains.known[name], after.root, {}, given, xp)
+        after = spread(chains.skeleton, after, chains.known[name], root=after.root, local={}, given=given, xp=xp)
     return after
 
 

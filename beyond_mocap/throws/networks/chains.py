@@ -24,7 +24,7 @@ LIMB_OF = ("left_arm", "right_arm", "left_leg", "right_leg")
 """The chain of each effector."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Chains:
     """Joint indices of a skeleton by chain.
 

@@ -18,7 +18,7 @@ BACK, AHEAD = 2, 6
 SAMPLES = BACK + 1 + AHEAD
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Description:
     """What a motion is to be, in the normalised frame: metres, Z up, floor at 0, the hips' first place over the
     ground at the origin, +X from there to the impact.

@@ -58,12 +58,12 @@ def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose
         return body_input(chains, pose, after, window, xp)
     number = LIMB_OF.index(name)
     if number < 2:
-        x = arm_input(number, chains, settings, pose, after, window, xp)
+        x = arm_input(number, chains, settings, pose=pose, after=after, window=window, xp=xp)
     else:
-        x = leg_input(number, chains, pose, after, window, xp)
+        x = leg_input(number, chains, pose, after=after, window=window, xp=xp)
     if not settings.guided:
         return x
-    return xp.concatenate([x, reached(number, chains, settings, pose, after, window, xp)], axis=-1)
+    return xp.concatenate([x, reached(number, chains, settings, pose=pose, after=after, window=window, xp=xp)], axis=-1)
 
 
 def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
@@ -146,8 +146,9 @@ def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, af
     its end is wanted in n + 1: of the joints that its network speaks of."""
     name = LIMB_OF[number]
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
-    limb = spread(chains.skeleton, after, chains.known[name], after.root, local, {}, xp)
-    bent = bent_limb(number, chains, limb, window.next[..., number, :], 1.0, _hinges(chains), True, xp)
+    limb = spread(chains.skeleton, after, chains.known[name], root=after.root, local=local, given={}, xp=xp)
+    bent = bent_limb(number, chains, limb, wanted=window.next[..., number, :], share=1.0, axes=_hinges(chains),
+                     turn_kept=True, xp=xp)
     return flat(six(picked(bent.local, predicted(name, chains, settings), -3, xp), xp), 2)
 
 
@@ -174,7 +175,7 @@ def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]
     )  # fmt: skip
     found = {}
     for name in settings.networks:
-        x = network_input(name, chains, settings, pose, pose, window)
+        x = network_input(name, chains, settings, pose=pose, after=pose, window=window)
         found[name] = (x.shape[-1], network_output(name, chains, settings, pose, pose).shape[-1])
     return found
 

@@ -77,7 +77,7 @@ class Stepper:
         x = features.single_input(self.chains, settings, pose, window)
         y = network.frame(np.clip(x, *network.bounds) if bounded else x, theta).astype(float)
         floating = answers.floating(self.chains, settings, y, pose)[0]
-        return answers.answered(SINGLE, self.chains, settings, y, pose, pose, window), floating
+        return answers.answered(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
 
     def _said(self, floating: np.ndarray) -> np.ndarray:
         return floating[[self.chains.joints.index(joint) for joint in self.effectors]]

@@ -46,7 +46,7 @@ class Options:
             raise InputError("options", found, "none of them negative, a share of at most 1")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Generated:
     """A generated motion.
 

@@ -41,13 +41,13 @@ def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.
     target = toward(tip, wanted, share) - (tip - places[..., end, :])
     hinge = xp.matmul(turns[..., parents[middle], :, :], axes[number])
     first, second, _ = bend_to(
-        places[..., upper, :], places[..., middle, :], places[..., end, :], target, hinge, xp
+        places[..., upper, :], places[..., middle, :], places[..., end, :], target=target, hinge=hinge, xp=xp
     )
     given = {joint: xp.matmul(first, turns[..., joint, :, :]) for joint in _between(chains, upper, middle)}
     given |= {joint: xp.matmul(second, turns[..., joint, :, :]) for joint in _between(chains, middle, end)}
     if turn_kept:
         given[end] = turns[..., end, :, :]
-    return spread(chains.skeleton, after, chains.known[LIMB_OF[number]], after.root, {}, given, xp)
+    return spread(chains.skeleton, after, chains.known[LIMB_OF[number]], root=after.root, local={}, given=given, xp=xp)
 
 
 class LimbReach:
@@ -87,7 +87,7 @@ class LimbReach:
     def _bent(self, local, places, turns, end, target) -> np.ndarray:
         """Local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
-        first, second, _ = bend_to(places[self._upper], places[self._middle], end, target, hinge, np)
+        first, second, _ = bend_to(places[self._upper], places[self._middle], end, target=target, hinge=hinge, xp=np)
         local = local.copy()
         local[self._upper] = transposed(turns[self._above_upper]) @ first @ turns[self._upper]
         bent = transposed(first @ turns[self._above_middle])

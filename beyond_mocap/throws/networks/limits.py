@@ -69,7 +69,7 @@ def _mean(q: np.ndarray) -> np.ndarray:
     return quaternion.normalized(middle)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Hinge:
     """Which way an elbow or knee bends. joint, end: the lower bone's joint and the one that ends it. across (3,): unit,
     in the axes of the joint's parent, about which it bends; along (3,): the lower bone's direction there when straight;
@@ -206,4 +206,4 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
     across = np.cross(along, unit_vector(middle[lower] @ skeleton.offsets[end], least=_TINY))
     if np.linalg.norm(across) < np.sin(_CLEAR):
         return None
-    return Hinge(lower, end, unit_vector(across, least=_TINY), along, skeleton.offsets[end])
+    return Hinge(joint=lower, end=end, across=unit_vector(across, least=_TINY), along=along, bone=skeleton.offsets[end])

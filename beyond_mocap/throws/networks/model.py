@@ -29,7 +29,7 @@ SLOWEST, FASTEST = 10.0, 500.0
 """Frames per second between which a model may be trained."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ModelSettings:
     """What kind of model it is.
 
@@ -77,7 +77,7 @@ class ModelSettings:
         return HIERARCHY if self.kind == "hierarchy" else (SINGLE,)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class ThrowModel:
     """A trained model of throws or kicks.
 

@@ -53,7 +53,7 @@ class OneFrame:
         turns = _rotations(self._ask(1, self._body_input(pose, after, window, relative), theta, bounded))
         after.local[self.said[1]] = turns
         _spread(self.plans["body"], after, {})
-        turns = _rotations(self._limbs(pose, after, window, relative, theta, bounded))
+        turns = _rotations(self._limbs(pose, after, window, relative=relative, theta=theta, bounded=bounded))
         after.local[self.limb_joints] = turns
         for number, name in enumerate(LIMB_OF):
             hand = self.given and number < 2

@@ -35,8 +35,8 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
 def _pinned(at: np.ndarray, gone: np.ndarray, release: float) -> np.ndarray:
     """Phases from a rising quantity `gone` (T,) at frames `at` (T,): 0 at the start, c at the release, 1 at the end."""
     then = np.interp(release, at, gone)
-    before = _part(gone, gone[0], then, at, at[0], release)
-    after = _part(gone, then, gone[-1], at, release, at[-1])
+    before = _part(gone, gone[0], then, at=at, first=at[0], last=release)
+    after = _part(gone, then, gone[-1], at=at, first=release, last=at[-1])
     return np.where(at < release, AT_RELEASE * before, AT_RELEASE + (1.0 - AT_RELEASE) * after)
 
 

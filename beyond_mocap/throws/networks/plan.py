@@ -36,7 +36,7 @@ _GRID = 200
 _VARIED = 0.7  # spread of the weights' logarithms with a seed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Wish:
     """How a ball is to leave and where it is to go: speed m/s, elevation rad, distance m over the ground from where the
     hips begin, height m of the target, limb: index into `EFFECTORS`."""
@@ -48,7 +48,7 @@ class Wish:
     limb: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Planned:
     """A description, and what it was made of: names and weights (N,) of the examples; root (T, 3) m, their roots' mean
     way, for where the body will stand; pace: by which they were sped up."""
@@ -110,11 +110,12 @@ def _blended(examples: list[Example], weights: np.ndarray, pace: float, wish: Wi
     now = np.interp(np.arange(count), times, steps)
     shown = [_shown(example, np.interp(now, steps, own)) for example, own in zip(examples, frames)]
     effectors, hands, root = (sum(w * part for w, part in zip(weights, parts)) for parts in zip(*shown))
-    description = Description(
-        effectors, from_six(hands), wish.limb, release, np.array([wish.distance, 0.0, wish.height]), fps,
-        *_beyond(examples[0], effectors),
-    )  # fmt: skip
-    return Planned(description, root, tuple(example.name for example in examples), weights, pace)
+    before, after = _beyond(examples[0], effectors)
+    impact = np.array([wish.distance, 0.0, wish.height])
+    description = Description(effectors=effectors, hands=from_six(hands), limb=wish.limb, release=release,
+                              impact=impact, fps=fps, before=before, after=after)
+    return Planned(description=description, root=root, names=tuple(example.name for example in examples),
+                   weights=weights, pace=pace)
 
 
 def _in_step(example: Example) -> np.ndarray:

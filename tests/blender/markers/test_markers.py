@@ -28,7 +28,10 @@ def trial(core):
     places = np.cumsum(rng.normal(0.0, 0.01, (61, 4, 3)), axis=0) + rng.normal(0.0, 0.5, (4, 3)) + [0.0, 0.0, 1.0]
     places[20:31, 1] = np.nan
     events = (made.MarkerEvent(0.7, "Foot Strike", "left"),)
-    return made.MarkerTrial(("LASI", "RASI", "LKNE", "*7"), places, 120.0, None, events, 0.5, "walk", "Ann")
+    return made.MarkerTrial(
+        labels=("LASI", "RASI", "LKNE", "*7"), positions=places, fps=120.0, residuals=None, events=events, start=0.5,
+        name="walk", subject="Ann",
+    )
 
 
 def seen_at(thing, frame):

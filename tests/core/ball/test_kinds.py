@@ -84,9 +84,9 @@ def test_of_two_near_players_he_has_it_who_had_it():
 
 
 def test_touches_as_a_table(tmp_path):
-    touch = SolvedTouch(
-        1.25, 0.01, "home_7", "foot", "kick", np.array([1.0, 2.0, 0.11]), np.zeros(3), np.array([9.0, 0.0, 3.0]), 0.9
-    )
+    touch = SolvedTouch(time=1.25, uncertainty=0.01, player="home_7", part="foot", kind="kick",
+                        position=np.array([1.0, 2.0, 0.11]), before=np.zeros(3), after=np.array([9.0, 0.0, 3.0]),
+                        confidence=0.9)
     write_touches(tmp_path / "t.csv", [touch])
     with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

@@ -15,7 +15,8 @@ def swing(count=9):
     middle = np.stack([x, 0.0 * x, 0.3 + 0.5 * x**2], axis=1)
     speed = 12.0 * (1.0 - (x / 0.6) ** 2)
     velocity = np.stack([speed, 0.0 * x, speed * x], axis=1)
-    return Strikes(np.arange(100, 100 + count), middle - [0.1, 0.0, 0.0], middle + [0.1, 0.0, 0.0], 0.04, velocity)
+    return Strikes(frames=np.arange(100, 100 + count), start=middle - [0.1, 0.0, 0.0], end=middle + [0.1, 0.0, 0.0],
+                   radius=0.04, velocity=velocity)
 
 
 @pytest.mark.parametrize("bounces", [0, 1])

@@ -102,7 +102,8 @@ def _take(library, pieces, asked, timeline, ball, start_time) -> Take:
 
 def _result(key, pieces, frames, start_time) -> KeyResult:
     frame = float(np.argmin(np.abs(frames - KEY_FRAME)))
-    return KeyResult(key, frame, pieces[0][0].path, KEY_FRAME, False, ("jogging", "kick", "right"))
+    return KeyResult(asked=key, frame=frame, clip=pieces[0][0].path, clip_frame=KEY_FRAME, mirrored=False,
+                     words=("jogging", "kick", "right"))
 
 
 @pytest.fixture(scope="session")

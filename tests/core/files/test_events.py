@@ -29,7 +29,8 @@ def made_match():
     x = np.array([-30.0, -20.0, 30.0, 20.0, 0.0])[:, None] * half
     positions = np.stack([x, np.zeros_like(x)], axis=2)
     ball = np.zeros((len(times), 3))
-    return Match(times, PLAYERS, positions, ball, 100.0, 64.0, 10.0, "made", ((0.0, 99.9), (110.0, 209.9)))
+    return Match(times=times, players=PLAYERS, positions=positions, ball=ball, length=100.0, width=64.0, fps=10.0,
+                 provider="made", periods=((0.0, 99.9), (110.0, 209.9)))
 
 
 def files():

@@ -60,7 +60,8 @@ def test_path_heading_and_speed_follow_the_recording():
 
 
 def clip(motion):
-    return Clip("made.bvh", False, motion, (), np.zeros((len(motion), 2, 2), bool))
+    return Clip(path="made.bvh", mirrored=False, motion=motion, annotations=(),
+                standing=np.zeros((len(motion), 2, 2), bool))
 
 
 def distances_within(features):

@@ -101,7 +101,8 @@ def test_the_side_of_another_row_is_not_the_kick_s():
         ClipAnnotation(0, 20, None, ("walking", "front")),
     )
     motion = gait(1.4, 0.8, 30.0)
-    clip = Clip("made.bvh", False, motion, rows, np.zeros((len(motion), 2, 2), bool))
+    clip = Clip(path="made.bvh", mirrored=False, motion=motion, annotations=rows,
+                standing=np.zeros((len(motion), 2, 2), bool))
     (found,) = keys_of((clip,))
     assert found.words == {"kick", "right", "low", "turning", "walking", "front"}
 

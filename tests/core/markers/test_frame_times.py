@@ -18,7 +18,7 @@ def places(times, seed=3):
 
 def trial(times, fps, noise=0.0003):
     seen = places(times) + np.random.default_rng(1).normal(0.0, noise, (len(times), 12, 3))
-    return MarkerTrial(LABELS, seen, fps)
+    return MarkerTrial(labels=LABELS, positions=seen, fps=fps)
 
 
 @pytest.mark.parametrize("fps, phase", [(360.0, 0.0), (360.0, 0.5), (240.0, 0.3), (300.0, 0.7)])
@@ -56,5 +56,5 @@ def test_what_is_not_seen_stays_so():
 
 def test_a_body_that_stands_still_tells_nothing():
     rng = np.random.default_rng(0)
-    recorded = MarkerTrial(LABELS, rng.normal(0.0, 0.0003, (400, 12, 3)) + 1.0, 360.0)
+    recorded = MarkerTrial(labels=LABELS, positions=rng.normal(0.0, 0.0003, (400, 12, 3)) + 1.0, fps=360.0)
     assert frame_times(recorded) is None

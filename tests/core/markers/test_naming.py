@@ -19,7 +19,7 @@ def trial_of(labels):
     positions = np.zeros((20, len(labels), 3))
     positions[:, :, 1] = [there[label] for label in labels]
     positions[:, :, 0] = np.arange(20)[:, None] * 0.01
-    return MarkerTrial(tuple(labels), positions, 100.0)
+    return MarkerTrial(labels=tuple(labels), positions=positions, fps=100.0)
 
 
 def test_other_names_become_the_sets_own():

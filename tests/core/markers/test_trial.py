@@ -19,7 +19,7 @@ def trial(**changes):
 
 def test_a_trial_keeps_copies_that_cannot_be_changed():
     given = np.zeros((2, 1, 3))
-    one = MarkerTrial(("A",), given, 50)
+    one = MarkerTrial(labels=("A",), positions=given, fps=50)
     given[:] = 1
     assert (one.positions == 0).all()
     with pytest.raises(ValueError):

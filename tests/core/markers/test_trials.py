@@ -89,8 +89,9 @@ def test_a_folder_without_reports_is_said(tmp_path):
 def throw_to(subject, angle, metres=20.0, side="right"):
     way = np.array([np.cos(angle), np.sin(angle)])
     hips = np.array([3.0, -1.0])
-    thrown = Throw(30.0, None, side, hips, hips + metres * way, 30.0 * np.append(way, 0.0), "ball")
-    return TrialResult("t", subject, throw=thrown)
+    thrown = Throw(speed=30.0, radar=None, side=side, hips=hips, impact=hips + metres * way,
+                   velocity=30.0 * np.append(way, 0.0), how="ball")
+    return TrialResult(name="t", subject=subject, throw=thrown)
 
 
 def test_impacts_are_aligned_to_each_subjects_throws():

@@ -28,10 +28,11 @@ def planted(seed=0, count=300, lag=(2.9, 2.9), drift=(0.0, 0.0), scatter=0.4, se
             since = time - start
             late = lag[number - 1] + drift[number - 1] * since + rng.normal(0.0, scatter)
             if rng.random() < seen:
-                event = MatchEvent(since + late, number, player, "home", KINDS[kind])
+                event = MatchEvent(time=since + late, period=number, player=player, team="home", kind=KINDS[kind])
                 rows.append((event, len(touches) - 1))
             if rng.random() < stray * seen:
-                rows.append((MatchEvent(rng.uniform(0, 900), number, f"p{rng.integers(22)}", "home", "pass"), -1))
+                rows.append((MatchEvent(time=rng.uniform(0, 900), period=number, player=f"p{rng.integers(22)}",
+                                        team="home", kind="pass"), -1))
     rows.sort(key=lambda row: (row[0].period, row[0].time))
     events = MatchEvents(tuple(event for event, _ in rows), "made", "events.xml")
     return touches, events, np.array([touch for _, touch in rows])
@@ -49,7 +50,9 @@ def test_few_events_that_do_not_fit_are_left_out_and_told():
     sent = [event for event in events.events if event.period == 1 and event.kind == "pass"]
     inside = [event for event in sent if 100.0 < event.time < 128.0]
     rng = np.random.default_rng(4)
-    moved = [MatchEvent(100.0 + 28.0 * share, 1, event.player, "home", "pass") for event, share in
+    moved = [MatchEvent(
+        time=100.0 + 28.0 * share, period=1, player=event.player, team="home", kind="pass",
+    ) for event, share in
              zip(inside * 2, rng.random(8))]  # fmt: skip
     others = [event for event in sent if not 90.0 < event.time < 140.0][:20]
     found = aligned(MatchEvents((*moved, *others), "made"), touches, HALVES, (100.0, 128.0))
@@ -144,7 +147,9 @@ def test_too_few_events_are_told_and_left():
 
 def test_events_of_nobody_and_of_periods_that_are_missing_keep_no_touch():
     touches, events, _ = planted()
-    extra = (MatchEvent(5.0, 1, "", "home", "pass"), MatchEvent(5.0, 3, "p1", "home", "pass"))
+    extra = (MatchEvent(
+        time=5.0, period=1, player="", team="home", kind="pass",
+    ), MatchEvent(time=5.0, period=3, player="p1", team="home", kind="pass"))
     found = aligned(MatchEvents((*events.events, *extra), "made"), touches, HALVES)
     assert found.touches[-2:].tolist() == [-1, -1] and np.isnan(found.times[-1])
 

@@ -16,9 +16,12 @@ from beyond_mocap.match.pieces.kept_pieces import keep_piece, kept_piece
 @pytest.fixture
 def parts():
     values = np.arange(36, dtype=np.int16).reshape(3, 12)
-    one = CrowdPart(Correction(np.array([3, 6, 9]), values, 30.0, 3), np.array([4, 5]), np.array([0.01, 0.02]), 0.1,
-                    np.array([7]), np.ones((1, 3)))  # fmt: skip
-    none = CrowdPart(Correction.none(30.0), np.zeros(0, int), np.zeros(0), 0.0, np.zeros(0, int), np.zeros((0, 3)))
+    one = CrowdPart(
+        correction=Correction(np.array([3, 6, 9]), values, 30.0, 3), frames=np.array([4, 5]),
+        depth=np.array([0.01, 0.02]), before=0.1, led_frames=np.array([7]), led=np.ones((1, 3)),
+    )  # fmt: skip
+    none = CrowdPart(correction=Correction.none(30.0), frames=np.zeros(0, int), depth=np.zeros(0), before=0.0,
+                     led_frames=np.zeros(0, int), led=np.zeros((0, 3)))
     return one, none
 
 

@@ -32,7 +32,8 @@ def edits(draw):
         st.booleans(),
     )  # fmt: skip
     clip, first, rate, length, cut = zip(*draw(st.lists(rows, min_size=count, max_size=count)))
-    return NamedEdit((("a.bvh", False), ("a.bvh", True), ("b.bvh", False)), clip, first, rate, length, (True, *cut[1:]))
+    return NamedEdit(clips=(("a.bvh", False), ("a.bvh", True), ("b.bvh", False)), clip=clip, first=first, rate=rate,
+                     length=length, cut=(True, *cut[1:]))
 
 
 @given(edits(), st.data())
@@ -50,7 +51,9 @@ def test_parts_of_an_edit_list_chained_are_the_whole(edit, data):
 @given(edits())
 def test_another_table_names_the_same_clips(edit):
     clips = (("b.bvh", False), ("z.bvh", True), ("a.bvh", True), ("a.bvh", False))
-    other = retabled(replace(edit, keys=(NamedKey(1.0, 2, 3.0, 1.0, 5.0, ("kick",)),)), clips)
+    other = retabled(replace(edit, keys=(NamedKey(
+        time=1.0, clip=2, frame=3.0, start=1.0, end=5.0, words=("kick",),
+    ),)), clips)
     assert [clips[c] for c in other.clip] == [edit.clips[c] for c in edit.clip]
     assert clips[other.keys[0].clip] == edit.clips[2] and table([other, edit])[0] == ("a.bvh", False)
 
@@ -118,7 +121,8 @@ def test_windows_that_never_agree_meet_at_the_cheapest_place(library, weaving_pl
     pieces = list(weaving_pieces)
     after = pieces[1].edit
     other = next(n for n, clip in enumerate(library.clips) if clip.path == "stand.bvh" and not clip.mirrored)
-    standing = NamedEdit((("stand.bvh", False),), [0], [5.0], [1.0], [len(after)], [True])
+    standing = NamedEdit(clips=(("stand.bvh", False),), clip=[0], first=[5.0], rate=[1.0], length=[len(after)],
+                         cut=[True])
     pieces[1] = replace(pieces[1], edit=standing)
     assert library.frames.count[other] > 100
     player, joints = spliced(library, [weaving_plan], pieces)

@@ -52,10 +52,11 @@ def made_stretch(random, begin: float) -> Stretch:
         gaits=(("walking", "walk.bvh"),), strong_foot="left",
         pins=(Pin(begin + 2.0, "gaze", (0.0, 1.0, 1.5), 0.5),),
     )  # fmt: skip
-    edit = NamedEdit(
-        (("a.bvh", False), ("sub/ü.bvh", True)), [0, 1, 0], random.normal(size=3) * 100.0, [1.0, 0.875, 0.7],
-        [90, 60, 90], [True, False, True], (NamedKey(begin + 1.1, 1, 20.5, 10.0, 30.0, ("kick", "left")),),
-    )  # fmt: skip
+    edit = NamedEdit(clips=(("a.bvh", False), ("sub/ü.bvh", True)), clip=[0, 1, 0], first=random.normal(size=3) * 100.0,
+                     rate=[1.0, 0.875, 0.7], length=[90, 60, 90], cut=[True, False, True],
+                     keys=(NamedKey(
+                         time=begin + 1.1, clip=1, frame=20.5, start=10.0, end=30.0, words=("kick", "left"),
+                     ),))  # fmt: skip
     return Stretch(kept(plan), edit, ("the library has no clip for 'bow'",), ((begin, begin + 1.0),))
 
 

@@ -32,8 +32,9 @@ def match_of(feed):
     """A planted feed as `read_match` would give it."""
     players = tuple(MatchPlayer(id_, team, id_, i % 11 + 1) for i, (id_, team) in enumerate(zip(feed.ids, feed.teams)))
     return Match(
-        feed.times, players, feed.positions, feed.ball, feed.length, feed.width, feed.fps, "planted",
-        ((float(feed.times[0]), float(feed.times[-1])),), teams=(Team("home"), Team("away")),
+        times=feed.times, players=players, positions=feed.positions, ball=feed.ball, length=feed.length,
+        width=feed.width, fps=feed.fps, provider="planted", periods=((float(feed.times[0]), float(feed.times[-1])),),
+        teams=(Team("home"), Team("away")),
     )  # fmt: skip
 
 
@@ -47,7 +48,8 @@ def planted():
 
 
 def touch(kind="kick", part="foot", height=0.11, time=1.0, after=(10.0, 0.0, 0.0), sure=0.9):
-    return SolvedTouch(time, 0.01, "a", part, kind, [0.0, 0.0, height], [0.0, 0.0, 0.0], after, sure)
+    return SolvedTouch(time=time, uncertainty=0.01, player="a", part=part, kind=kind, position=[0.0, 0.0, height],
+                       before=[0.0, 0.0, 0.0], after=after, confidence=sure)
 
 
 def running(speed):
@@ -101,8 +103,10 @@ def test_without_a_ball_nobody_has_words(planted):
 
 
 def test_key_moments_of_one_player_keep_apart_and_the_surer_one_stays():
-    sure, unsure = Moment(1.0, ("kick",), TOUCHES, 0.9), Moment(1.3, ("kick",), TOUCHES, 0.5)
-    other = Moment(1.0 + NEAREST, ("receive", "foot"), TOUCHES, 0.4)
+    sure, unsure = Moment(
+        time=1.0, words=("kick",), source=TOUCHES, confidence=0.9,
+    ), Moment(time=1.3, words=("kick",), source=TOUCHES, confidence=0.5)
+    other = Moment(time=1.0 + NEAREST, words=("receive", "foot"), source=TOUCHES, confidence=0.4)
     assert apart([unsure, other, sure]) == [sure, other]
 
 
@@ -114,7 +118,9 @@ def test_touches_in_a_row_are_one_dribble():
 
 
 def test_a_timeline_is_cut_to_its_span():
-    moments = [Moment(1.0, ("kick",), TOUCHES, 1.0), Moment(2.0, ("dribble",), TOUCHES, 1.0, 6.0)]
+    moments = [Moment(
+        time=1.0, words=("kick",), source=TOUCHES, confidence=1.0,
+    ), Moment(time=2.0, words=("dribble",), source=TOUCHES, confidence=1.0, end=6.0)]
     timeline = timeline_of(moments, 1.5, 4.0)
     assert not timeline.keys and [(span.start, span.end) for span in timeline.spans] == [(2.0, 4.0)]
 
@@ -133,7 +139,9 @@ def test_words_come_back_from_their_file(tmp_path, planted):
 
 
 def test_edits_are_seen_and_kept(tmp_path):
-    moments = (Moment(1.5, ("kick", "low"), TOUCHES, 0.75), Moment(3.0, ("header",), TOUCHES, 0.5))
+    moments = (Moment(
+        time=1.5, words=("kick", "low"), source=TOUCHES, confidence=0.75,
+    ), Moment(time=3.0, words=("header",), source=TOUCHES, confidence=0.5))
     file = tmp_path / "p.txt"
     write_words(file, "home_7", moments)
     text = file.read_text()
@@ -141,7 +149,7 @@ def test_edits_are_seen_and_kept(tmp_path):
     file.write_text(text.replace("3 header  # touches 0.50\n", "3.2 header jump\n"))
     assert edited(file)
     kept, changed = read_words(file, moments)
-    assert kept == moments[0] and changed == Moment(3.2, ("header", "jump"), USER, 1.0)
+    assert kept == moments[0] and changed == Moment(time=3.2, words=("header", "jump"), source=USER, confidence=1.0)
     file.write_bytes(text.replace("\n", "\r\n").encode())  # another editor's line ends are no edit
     assert not edited(file)
     file.write_text("1.0 kcik\n")

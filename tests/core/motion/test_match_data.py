@@ -32,7 +32,8 @@ def two_halves(seed=0):
 
 def match_of(times, positions, ball, teams):
     players = tuple(MatchPlayer(f"{team}_{i}", team, "", i) for i, team in enumerate(teams))
-    return Match(times, players, positions, ball, 105.0, 68.0, 10.0, "made", PERIODS)
+    return Match(times=times, players=players, positions=positions, ball=ball, length=105.0, width=68.0, fps=10.0,
+                 provider="made", periods=PERIODS)
 
 
 # --- who is there

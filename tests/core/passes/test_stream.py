@@ -271,7 +271,9 @@ class Played:
 
         count = min(int(self.now / self.step) + 1, len(self.frames))
         some = enumerate(self.frames[number:count], start=number)
-        return [Arrived(n + 1, n * self.step, None, frame.values, frame.rows) for n, frame in some]
+        return [Arrived(
+            number=n + 1, time=n * self.step, sent=None, values=frame.values, rows=frame.rows,
+        ) for n, frame in some]
 
 
 @pytest.mark.parametrize("fps", [30.0, 60.0, 120.0])

@@ -21,7 +21,7 @@ def walker(path, speed=1.5, seconds=13.0, ahead=0.0, name="walker"):
     """Someone who walks along a path at a constant speed, from `ahead` metres on."""
     times, length = np.arange(int(seconds * FPS) + 1) / FPS, ArcLength(path)
     arc = np.minimum(ahead + speed * times, length.length)
-    return Follower(name, times, path.at(length.parameter(arc)), path, arc)
+    return Follower(name=name, times=times, places=path.at(length.parameter(arc)), path=path, arc=arc)
 
 
 def ridden(follower, change):
@@ -113,13 +113,13 @@ def test_who_follows_too_closely_further_on_waits():
     """A bend in the way of the second lets both walk one line from there on, 0.3 m apart."""
     first = walker(line((0, 0), (12, 0)), seconds=8.0, ahead=3.3)
     second = walker(through(np.array([[3.0, -3, 0], [3.0, -0.5, 0], [3.5, 0, 0], [15.0, 0, 0]]), "bend"), seconds=8.0)
-    first = Follower("first", first.times, first.places, first.path, first.arc)
+    first = Follower(name="first", times=first.times, places=first.places, path=first.path, arc=first.arc)
     found = resolved([first, second])
     assert_apart([first, second], found)
 
 
 def test_a_post_in_the_way_is_gone_round():
-    post = Follower("post", np.array([0.0, 1.0]), np.zeros((2, 3)))
+    post = Follower(name="post", times=np.array([0.0, 1.0]), places=np.zeros((2, 3)))
     found = resolved([walker(EAST), post])
     assert found.left == () and found.changes[1] == Change()
     [(arc, _, offset)] = found.changes[0].detours
@@ -128,14 +128,14 @@ def test_a_post_in_the_way_is_gone_round():
 
 
 def test_posts_that_touch_are_nobodys_concern():
-    posts = [Follower(name, np.array([0.0, 1.0]), np.zeros((2, 3))) for name in "ab"]
+    posts = [Follower(name=name, times=np.array([0.0, 1.0]), places=np.zeros((2, 3))) for name in "ab"]
     found = resolved([*posts, walker(line((-10, 5), (10, 5)))])
     assert found.before == found.left == ()
 
 
 def test_what_cannot_be_mended_is_told_and_the_rest_is_mended():
     stand = {f"post {y}": np.tile([0.0, y, 0.0], (2, 1)) for y in np.arange(-2, 2.1, 0.5)}
-    wall = [Follower(name, np.array([0.0, 1.0]), places) for name, places in stand.items()]
+    wall = [Follower(name=name, times=np.array([0.0, 1.0]), places=places) for name, places in stand.items()]
     away = [walker(line((-10, 20), (10, 20))), walker(line((10, 20), (-10, 20)))]
     found = resolved([walker(EAST), *away, *wall])
     assert {collision.first for collision in found.left} == {0}
@@ -163,8 +163,9 @@ def test_round_and_round_a_closed_path_and_through_it():
     ring = through(3.0 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1), "ring", closed=True)
     length, times = ArcLength(ring), np.arange(901) / FPS
     arc = 1.5 * times
-    around = Follower("around", times, ring.at(length.parameter(arc % length.length)), ring, arc)
-    post = Follower("post", np.array([0.0, 1.0]), np.tile([-3.0, 0.1, 0.0], (2, 1)))
+    around = Follower(name="around", times=times, places=ring.at(length.parameter(arc % length.length)), path=ring,
+                      arc=arc)
+    post = Follower(name="post", times=np.array([0.0, 1.0]), places=np.tile([-3.0, 0.1, 0.0], (2, 1)))
     found = resolved([around, post])
     assert len(found.before) == 2 and found.left == ()
     assert len(found.changes[0].detours) == 1

@@ -53,7 +53,8 @@ def generating(monkeypatch, by):
         motion, off = next(made)
         places = forward_kinematics(motion)[0][:, list(chains_of(motion.skeleton).effectors)]
         nothing = np.zeros((len(motion), len(motion.skeleton)))
-        return Generated(motion, places, places + off, description.effectors, nothing, None, 3, 0.05)
+        return Generated(motion=motion, effectors=places, predicted=places + off, wanted=description.effectors,
+                         over=nothing, floating=None, iterations=3, seconds=0.05)
 
     monkeypatch.setattr(recipe, "generate", generate)
 

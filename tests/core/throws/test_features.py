@@ -19,7 +19,7 @@ from beyond_mocap.throws.networks.training_set import leg_reach, steps, training
 
 TARGET = np.array([12.0, 3.0, 1.2])
 KINDS, WRISTS, FRAMES = ("hierarchy", "single"), ("given", "inferred"), ("hip", "static")
-ALL = [ModelSettings(kind, wrist=wrist, frame=frame) for kind in KINDS for wrist in WRISTS for frame in FRAMES]
+ALL = [ModelSettings(kind=kind, wrist=wrist, frame=frame) for kind in KINDS for wrist in WRISTS for frame in FRAMES]
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +127,7 @@ def test_the_input_follows_the_paper(example):
     assert found["right_leg"] == (54 + 3 + 6 + 1 + 4 * 6 + 3 * 3 + len(chains.leg_sees) * 6, 4 * 6)
     assert widths(chains, ModelSettings(wrist="inferred"))["left_arm"] == (found["left_arm"][0], 18)
     joints = len(chains.joints)
-    assert widths(chains, ModelSettings("single"))["single"] == (2 + 3 + 4 * 54 + joints * 12, joints * 9)
+    assert widths(chains, ModelSettings(kind="single"))["single"] == (2 + 3 + 4 * 54 + joints * 12, joints * 9)
     pose, after, window = steps(example)
     arm = network_input("right_arm", chains, ModelSettings(), pose, after, window)
     socket = after.positions[:, chains.sockets[1]]
@@ -206,7 +206,7 @@ def test_ends_of_the_truth_are_where_the_joints_are(example, settings):
 
 
 def test_the_single_network_floats(example):
-    chains, settings = chains_of(example.motion.skeleton), ModelSettings("single")
+    chains, settings = chains_of(example.motion.skeleton), ModelSettings(kind="single")
     pose, after, _ = steps(example)
     y = network_output("single", chains, settings, pose, after)
     places, turns = floating(chains, settings, y, pose)

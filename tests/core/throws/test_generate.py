@@ -58,10 +58,10 @@ def thrown(y=0.0, stature=1.8, arm="right", fps=30.0):
 def knowing(examples, **settings):
     settings = ModelSettings(points=1, layers=1, units=2, **settings)
     rows = training_set(examples, settings)
-    return ThrowModel(
-        settings, examples[0].motion.skeleton, {name: by_heart(rows[name]) for name in settings.networks},
-        leg_reach(examples), tuple(examples), joint_limits=learn(np.concatenate([e.motion.rotations for e in
-        examples])), )  # fmt: skip
+    return ThrowModel(settings=settings, skeleton=examples[0].motion.skeleton,
+                      networks={name: by_heart(rows[name]) for name in settings.networks},
+                      leg_reach=leg_reach(examples), examples=tuple(examples),
+                      joint_limits=learn(np.concatenate([e.motion.rotations for e in examples])))  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -62,7 +62,8 @@ def random_model(example, settings, seed=0):
             rows[name].inputs.mean(0), rows[name].inputs.std(0) + 0.1,
             rows[name].answers.mean(0), rows[name].answers.std(0) + 0.02,
         )  # fmt: skip
-    return ThrowModel(settings, example.motion.skeleton, networks, leg_reach([example]), (example,))
+    return ThrowModel(settings=settings, skeleton=example.motion.skeleton, networks=networks,
+                      leg_reach=leg_reach([example]), examples=(example,))
 
 
 def plainly(model, chains, pose, window):

@@ -22,8 +22,8 @@ def launches(examples):
 
 
 def wish_of(example, launch, **changed):
-    asked = Wish(float(np.linalg.norm(launch)), float(np.arctan2(launch[2], np.hypot(*launch[:2]))),
-                 float(example.impact[0]), float(example.impact[2]), example.limb)  # fmt: skip
+    asked = Wish(speed=float(np.linalg.norm(launch)), elevation=float(np.arctan2(launch[2], np.hypot(*launch[:2]))),
+                 distance=float(example.impact[0]), height=float(example.impact[2]), limb=example.limb)  # fmt: skip
     return replace(asked, **changed)
 
 

@@ -60,7 +60,8 @@ def dribble(
         for part in _parts(low, high, held, len(path), fps):
             if not np.isfinite(path[part.low : part.high + 1]).all():
                 continue
-            search = Search(skeleton, root, rotations, standing, path, measured, part, fps)
+            search = Search(skeleton, root, rotations, standing=standing, path=path, measured=measured, part=part,
+                            fps=fps)
             found = search.run()
             if found is None:
                 continue
@@ -69,8 +70,8 @@ def dribble(
             pushes += [Push(p.first + part.low, p.last + part.low, p.side) for p in search.pushes]
             touched = [*held, *((push.first, push.last) for push in pushes)]
             others = [*turns, *(edge for pair in touched for edge in pair)]
-            path = _joined(path, ball, part, before, after, others, fps)
-            path = _kept_out(skeleton, root, rotations, path, part, touched, fps)
+            path = _joined(path, ball, part, first=before, last=after, others=others, fps=fps)
+            path = _kept_out(skeleton, root, rotations, path=path, part=part, held=touched, fps=fps)
     return Dribbled(path, tuple(sorted(pushes, key=lambda push: push.first)))
 
 

@@ -73,7 +73,7 @@ def best_aim(
     """
     shares = _ALONG[: 1 if rise else None]
     aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
-    found = meetings(line, radius, aims, rise, ball, room, avoid)
+    found = meetings(line, radius, aims, rise=rise, ball=ball, room=room, avoid=avoid)
     least = np.linalg.norm(found.need, axis=1)
     least += _ANGLE_COST * np.abs(np.repeat(_ANGLES, len(aims) // len(_ANGLES)))
     least += _ALONG_COST * np.abs([aim.along - 0.5 for aim in aims])

@@ -105,19 +105,20 @@ def strike(
     height_known = everywhere if height_known is None else np.asarray(height_known, bool)
     root, rotations, feed = (np.array(values, dtype=float) for values in (root, rotations, ball))
     path, moved = feed.copy(), np.full(len(touches), np.nan)
-    touches = [_when_met(skeleton, root, rotations, feed, touch, fps) for touch in touches]
+    touches = [_when_met(skeleton, root, rotations, feed=feed, touch=touch, fps=fps) for touch in touches]
     for number, moment in _moments(skeleton, touches, count, fps):
         if not np.isfinite(feed[list(moment.held)]).all():
             continue
         span = slice(max(moment.low, 0), min(moment.high, count - 1) + 1)
         body = Body.posed(skeleton, root[span], rotations[span])
-        scene = _scene(body, moment, span.start, contacts[span], path, measured, height_known, fps)
+        scene = _scene(body, moment, span.start, contacts=contacts[span], path=path, measured=measured,
+                       height_known=height_known, fps=fps)
         struck, moved[number] = _reached(scene, body)
         root[span], rotations[span] = struck.root, struck.rotations
         places = [scene.ball_and_needs(scene.lines(struck, frame), frame)[0] for frame in moment.held]
         path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
-    gap, shift = _told(skeleton, root, rotations, feed, path, touches)
-    return Struck(root, rotations, path, gap, shift, moved)
+    gap, shift = _told(skeleton, root, rotations, feed=feed, path=path, touches=touches)
+    return Struck(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 
 
 def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: float) -> Touch:
@@ -134,7 +135,7 @@ def _when_met(skeleton: Skeleton, root, rotations, feed, touch: Touch, fps: floa
     return replace(touch, frame=float(first + later), entry=touch.entry + later, leave=touch.leave - later)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class _Moment:
     """A touch in frames: the nearest one; the two around it, in which it is held; low and high, at which the body is as
     it was; bounds, the held frames of the touches before and after."""
@@ -158,7 +159,8 @@ def _moments(skeleton: Skeleton, touches: Sequence[Touch], count: int, fps: floa
         before, after = ends[place][1], ends[place + 2][0]
         low = max(int(first - np.clip(touch.entry, shortest, longest)), before)
         high = min(int(np.ceil(last + np.clip(touch.leave, shortest, longest))), after)
-        yield number, _Moment(frozenset(touch.words), _nearest(frame, count), held[place], low, high, (before, after))
+        yield number, _Moment(words=frozenset(touch.words), frame=_nearest(frame, count), held=held[place], low=low,
+                              high=high, bounds=(before, after))
 
 
 def _nearest(frame: float, count: int) -> int:
@@ -174,7 +176,7 @@ def held_frames(frame: float, count: int) -> tuple[int, int]:
     return int(np.clip(np.floor(frame), 0, count - 1)), int(np.clip(np.ceil(frame), 0, count - 1))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class _Scene:
     """What a touch is played with: the parts, each with the share (W,) of its shift per frame; the ball's path (T, 3)
     and whether it is measured (T,); the side of the part on which the ball is; what the ball avoids; `origin`, the
@@ -204,7 +206,7 @@ class _Scene:
         part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
         if len(lines) == 2:
             return held_meeting(lines, part.radius, ball, room)
-        met = meetings(lines[0], part.radius, [self.aim], _RISE[part.part], ball, room, self.avoid)
+        met = meetings(lines[0], part.radius, [self.aim], rise=_RISE[part.part], ball=ball, room=room, avoid=self.avoid)
         return met.ball[0], met.need
 
     def room(self, frame: int) -> Room:
@@ -219,22 +221,24 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
     if choices[0].part == "hand" and _together(body, choices, at, moment.words):
         parts = choices
     else:
-        parts = (_likeliest(body, choices, at, contacts, path[moment.frame], fps),)
+        parts = (_likeliest(body, choices, at, contacts=contacts, ball=path[moment.frame], fps=fps),)
     shares = tuple(_share(moment, origin, len(body.root), _standing(contacts, part), fps) for part in parts)
     line, radius = body.line(parts[0], at), parts[0].radius
     if parts[0].part != "foot" or _HIGH & moment.words:
         height = 0.5 * (line[0] + line[1])[2] + _RISE[parts[0].part] * (radius + BALL_RADIUS)
         path = lofted(path, moment.frame, float(height), ~height_known, fps)
-    ahead = _direction(body, parts[0], moment, at, path, fps)
+    ahead = _direction(body, parts[0], moment, at=at, path=path, fps=fps)
     avoid = _other_leg(body, parts[0], at) if parts[0].part == "foot" else []
-    scene = _Scene(moment, parts, shares, path, measured, Aim(ahead), avoid, origin)
+    scene = _Scene(moment=moment, parts=parts, shares=shares, ball=path, measured=measured, aim=Aim(ahead), avoid=avoid,
+                   origin=origin)
     if len(parts) == 2:
         return scene
     def possible(need: np.ndarray) -> np.ndarray:
         return _bounded(body, parts[0], at, need)
 
     rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
-    return replace(scene, aim=best_aim(line, radius, ahead, rise, ball, room, avoid, possible))
+    return replace(scene, aim=best_aim(line, radius, ahead, rise=rise, ball=ball, room=room, avoid=avoid,
+                                       possible=possible))
 
 
 def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
@@ -374,7 +378,7 @@ def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
     chain = _chain(body, part)
     place = body.places[at, chain[2]] + shift
     lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
-    return swing_to(body, chain, at, place, MOST_SWING[part.part], lowered)
+    return swing_to(body, chain, at, place=place, most=MOST_SWING[part.part], lowered=lowered)
 
 
 def _chain(body: Body, part: Surface) -> tuple[int, int, int]:

@@ -102,7 +102,7 @@ def _reached(
         shift *= min(1.0, MOST / max(np.linalg.norm(shift), 1e-9))
         if grounded and meeting.surface.part == "foot":
             shift = above_ground(body, meeting.surface, at, shift)
-        struck = _carried(body, meeting.surface, at, shift, share, grounded)
+        struck = _carried(body, meeting.surface, at, shift=shift, share=share, grounded=grounded)
         left = abs(_gap(struck, meeting, at))
         if left < best[2]:
             best = struck, float(np.linalg.norm(shift)), left

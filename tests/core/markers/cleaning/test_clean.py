@@ -149,7 +149,8 @@ def test_an_unlabeled_marker_takes_the_label_that_is_missing_there_and_no_other(
     extra = np.full((len(positions), 2, 3), np.nan)
     extra[82:150, 0] = knee[82:150]
     extra[60:170, 1] = knee[60:170] + [0.0, 0.4, 0.2]
-    trial = MarkerTrial((*walk.trial.labels, "*12", "*13"), np.concatenate([positions, extra], axis=1), walk.trial.fps)
+    trial = MarkerTrial(labels=(*walk.trial.labels, "*12", "*13"), positions=np.concatenate([positions, extra], axis=1),
+                        fps=walk.trial.fps)
     cleaned, report = clean(trial, clusters_of(walk))
     assert [one.labels for one in report.assigned] == [("*12", "LKNE")]
     assert off(walk, cleaned, "LKNE").max() < 0.02
@@ -184,15 +185,15 @@ def test_each_step_can_be_left_out(walk):
 
 
 def test_odd_trials_do_no_harm(walk):
-    none = MarkerTrial((), np.zeros((5, 0, 3)), 100.0)
+    none = MarkerTrial(labels=(), positions=np.zeros((5, 0, 3)), fps=100.0)
     assert clean(none).report.lines == ()
-    empty = MarkerTrial(("A", "B"), np.zeros((0, 2, 3)), 100.0)
+    empty = MarkerTrial(labels=("A", "B"), positions=np.zeros((0, 2, 3)), fps=100.0)
     assert len(clean(empty).trial) == 0
-    one = MarkerTrial(("A", "B"), np.full((1, 2, 3), 1.0), 100.0)
+    one = MarkerTrial(labels=("A", "B"), positions=np.full((1, 2, 3), 1.0), fps=100.0)
     np.testing.assert_array_equal(clean(one).trial.positions, one.positions)
     unseen = replace(walk.trial, positions=np.full_like(walk.trial.positions, np.nan))
     assert np.isnan(clean(unseen, clusters_of(walk)).trial.positions).all()
-    same = MarkerTrial(tuple("ABCDE"), np.zeros((50, 5, 3)), 100.0)
+    same = MarkerTrial(labels=tuple("ABCDE"), positions=np.zeros((50, 5, 3)), fps=100.0)
     np.testing.assert_array_equal(clean(same).trial.positions, 0.0)
 
 

@@ -176,7 +176,7 @@ def test_what_is_wrong_is_told(lines, read, change, said):
 
 
 def test_a_written_trial_is_read_as_it_was(body, tmp_path):
-    trial = MarkerTrial(body.labels, body.positions, 240.0, start=1.5, name="there")
+    trial = MarkerTrial(labels=body.labels, positions=body.positions, fps=240.0, start=1.5, name="there")
     write_trc(trial, tmp_path / "there.trc")
     again = read_markers(tmp_path / "there.trc")
     assert (again.labels, again.fps, again.start, again.name) == (trial.labels, 240.0, 1.5, "there")

@@ -34,8 +34,10 @@ def adjusted(motion, places, seen, shift):
     known before is as wrong."""
     offsets, places = OFFSETS.copy(), places - (JOINT >= 1)[:, None] * shift
     offsets[1] += shift
-    body = Body(NAMES, PARENTS, offsets, JOINT, places.copy(), np.zeros(3, bool), np.array([-1, -1, 2]))
-    prior = Prior(offsets.copy(), np.array([0.01, 0.02, 0.02]), places.copy(), np.full(len(JOINT), 0.008))
+    body = Body(names=NAMES, parents=PARENTS, offsets=offsets, joint=JOINT, places=places.copy(),
+                held=np.zeros(3, bool), limb=np.array([-1, -1, 2]))
+    prior = Prior(offsets=offsets.copy(), offset_sigma=np.array([0.01, 0.02, 0.02]), places=places.copy(),
+                  place_sigma=np.full(len(JOINT), 0.008))
     task = Adjustment(body, prior, Pull({}), seen, np.full(len(JOINT), 0.001), worth=FRAMES)
     task.start(motion)
     before = task.cost()

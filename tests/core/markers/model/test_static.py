@@ -87,5 +87,5 @@ def test_somebody_who_walks_is_no_static(known):
 
 
 def test_without_segments_places_are_averaged(known):
-    trial = MarkerTrial(("A",), np.full((10, 1, 3), 0.5), 100.0)
+    trial = MarkerTrial(labels=("A",), positions=np.full((10, 1, 3), 0.5), fps=100.0)
     np.testing.assert_allclose(static_frame(trial, {})["A"], 0.5)

@@ -22,7 +22,8 @@ def bound(joint, angle, low, high, **more):
 def task_of(made, truth):
     placed = place(made, truth)
     seen = placed.markers + placed.origin
-    return Task(made, seen, np.ones((len(made.joint), seen.shape[-1])), np.full((len(SKELETON), 3), 1e-3))
+    return Task(chain=made, seen=seen, weights=np.ones((len(made.joint), seen.shape[-1])),
+                drawn=np.full((len(SKELETON), 3), 1e-3))
 
 
 def posed(made, joint, angles, count=6):

@@ -24,9 +24,8 @@ def model_of(known):
     counts = {name: int(np.sum(joint == index)) for index, name in enumerate(skeleton.names)}
     freedom, stiffness = freedom_of(skeleton.names, skeleton.parents, counts)
     usual, unsure = np.full(len(kept), 0.005), np.full(len(skeleton), 0.01)
-    return MarkerModel(
-        skeleton, known.trial.labels, joint, places, usual, np.full(len(kept), 0.03), freedom, stiffness, unsure
-    )
+    return MarkerModel(skeleton=skeleton, markers=known.trial.labels, joint=joint, places=places, sigma=usual,
+                       edge_sigma=np.full(len(kept), 0.03), freedom=freedom, stiffness=stiffness, centre_sigma=unsure)
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +106,8 @@ def test_a_held_ball_turns_a_hand_that_its_markers_leave_open(run):
     hidden = run.trial.positions.copy()
     hidden[:, np.isin(run.trial.labels, [label for label, on in run.segments.items() if on == "RightHand"])] = np.nan
     trial = replace(run.trial, positions=hidden)
-    ball = HeldBall("RightHand", centre, radius, on_surface, np.ones(len(hidden), dtype=bool))
+    ball = HeldBall(joint="RightHand", centre=centre, radius=radius, seen=on_surface,
+                    held=np.ones(len(hidden), dtype=bool))
     without, held = solve(model, trial), solve(model, trial, PoseSettings(ball=ball))
     joints, turns = forward_kinematics(held.motion)
     distance = np.linalg.norm(joints[:, hand] + quaternion.rotate(turns[:, hand], centre) - on_surface, axis=-1)

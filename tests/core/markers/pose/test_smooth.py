@@ -26,7 +26,7 @@ def task_of(made, truth, noise=0.004, **more):
     placed = place(made, truth)
     seen = placed.markers + placed.origin + np.random.default_rng(2).normal(0.0, noise, placed.markers.shape)
     weights = np.ones((len(made.joint), seen.shape[-1]))
-    return Task(made, seen, weights, np.full((len(SKELETON), 3), 1e-3), **more)
+    return Task(chain=made, seen=seen, weights=weights, drawn=np.full((len(SKELETON), 3), 1e-3), **more)
 
 
 def off(truth, found):
@@ -77,7 +77,7 @@ def test_a_held_point_takes_part():
     spot = np.array([0.0, 0.1, 0.0])
     there = placed.joints[4] + np.einsum("abf,b->af", placed.world[4], spot) + placed.origin
     seen = there + np.array([0.0, 0.0, 0.04])[:, None]
-    point = HeldPoint(4, spot, 0.02, seen, np.full(30, 100.0))
+    point = HeldPoint(joint=4, place=spot, radius=0.02, seen=seen, weight=np.full(30, 100.0))
     task = task_of(made, truth, noise=0.0, point=point)
     found, alone = smooth(task, truth, 1e-4, FPS)[0], descend(task, truth).poses
     assert off(alone, found) < 0.2 < off(truth, found)
