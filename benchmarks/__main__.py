@@ -19,10 +19,9 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-from beyond_mocap import __version__  # noqa: E402
-
 from benchmarks import effort  # noqa: E402
 from benchmarks.places import DATA, ROOT  # noqa: E402
+from beyond_mocap import __version__  # noqa: E402
 
 SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scenarios": ("Synthesis", (("", "scenarios", "section"),)),

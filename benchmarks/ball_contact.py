@@ -8,19 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.ball.contact import striking_surface
-from beyond_mocap.evaluation.report import cell, evaluate
-from beyond_mocap.passes.scene_json import read_scene
-from beyond_mocap.library.library import Library
-from beyond_mocap.library.build import build
-from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.passes.passes import Passes, passes
-from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.synthesize import synthesize
-
 from benchmarks import effort
 from benchmarks.markdown import head, row
 from benchmarks.places import LIBRARIES, ROOT, library_folder, scenario
+from beyond_mocap.ball.contact import striking_surface
+from beyond_mocap.evaluation.report import cell, evaluate
+from beyond_mocap.library.build import build
+from beyond_mocap.library.library import Library
+from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.passes.passes import Passes, passes
+from beyond_mocap.passes.scene_json import read_scene
+from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.synthesize import synthesize
 
 SCENES = ("three", "six", "volley_net", "racquet", "dropped")
 SAMPLES = ROOT / "sample_blend"

@@ -8,16 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import Feed, sampled
-from beyond_mocap.ball.tracked.solve import SolvedBall
-from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
-from beyond_mocap.ball.solve_ball import solve_ball
-
 from benchmarks import effort
 from benchmarks.markdown import head, row
 from benchmarks.places import DATA, ROOT
 from benchmarks.touch_score import Reading, ReadTouch, Score, read_touches, scored, scored_by_events
+from beyond_mocap.ball.solve_ball import solve_ball
+from beyond_mocap.ball.tracked.solve import SolvedBall
+from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
+from beyond_mocap.synthetic.ground_truth.planted import planted_match
+from beyond_mocap.synthetic.ground_truth.planted_feed import Feed, sampled
 
 MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"

@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from beyond_mocap.base.easing import smoothstep
 from beyond_mocap.annotation import Timeline
+from beyond_mocap.base.easing import smoothstep
 from beyond_mocap.library.library import Library
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics

@@ -7,17 +7,16 @@ from functools import lru_cache
 
 import numpy as np
 
-from beyond_mocap.files.bvh import bvh
-from beyond_mocap.markers.files.marker_set_text import chosen_set
-from beyond_mocap.markers.cleaning.clean import clean
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
-from beyond_mocap.synthetic.ground_truth.planted_error import PlantedError, planted_error
-from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
-
 from benchmarks import markdown
 from benchmarks.places import CMU_UNIT, DATA
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.markers.cleaning.clean import clean
+from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
+from beyond_mocap.motion.motion import Motion
+from beyond_mocap.synthetic.ground_truth.planted_error import PlantedError, planted_error
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.throws import throw
 
 CLIPS = {
     "walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_running_1.bvh", 0, 360),

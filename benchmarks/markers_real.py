@@ -8,12 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.markers.files.marker_files import read_markers
-from beyond_mocap.motion import quaternion
-from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
-
 from benchmarks import markdown
 from benchmarks.places import DATA
+from beyond_mocap.markers.files.marker_files import read_markers
+from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
+from beyond_mocap.motion import quaternion
 
 TRIALS = (
     ("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None), ("kinematics_tennis_serve.c3d", None),

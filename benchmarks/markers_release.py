@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from beyond_mocap.markers.files.marker_set_text import chosen_set
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
-from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
-from beyond_mocap.markers.release.release import ReleaseSettings, release
-
 from benchmarks import markdown
 from benchmarks.markers_real import made
+from beyond_mocap.markers.files.marker_set_text import chosen_set
+from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
+from beyond_mocap.markers.release.release import ReleaseSettings, release
+from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.throws import throw
 
 THROWS = (
     (18.0, 30.0, "right", "overarm", 240.0, 15.0), (18.0, 36.0, "right", "overarm", 360.0, 25.0),

@@ -10,22 +10,21 @@ from pathlib import Path
 
 import numpy as np
 
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
-from beyond_mocap.synthesis.quality.jerk import jerk
-from beyond_mocap.match.take_npz import read_player
-from beyond_mocap.library.library import Library
+from benchmarks.effort import seconds
+from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.library.build import build
+from beyond_mocap.library.library import Library
+from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, applied
 from beyond_mocap.match.crowd.crowd import kept_apart, overlap_depths
+from beyond_mocap.match.crowd.variety import share_in_step
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
-from beyond_mocap.match.crowd.variety import share_in_step
+from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, applied
+from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
+from beyond_mocap.synthesis.quality.jerk import jerk
 from beyond_mocap.synthesis.take import Take
-
-from benchmarks.effort import seconds
-from benchmarks.places import CMU_UNIT, DATA
 
 SECONDS = (1480.0, 1500.0)
 """Of the recorded half: players stand close together, so that there is something to keep apart."""

@@ -9,9 +9,12 @@ import tempfile
 
 import numpy as np
 
+from benchmarks.effort import seconds
+from benchmarks.markdown import head, row
+from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.files.tracking.tracking import Match, read_match
-from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
+from beyond_mocap.library.library import Library
 from beyond_mocap.motion.track import clean, sample
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
@@ -20,10 +23,6 @@ from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.wanted import build_order
 from beyond_mocap.synthesis.search_library import search_library
 from beyond_mocap.synthesis.synthesize import synthesize
-
-from benchmarks.effort import seconds
-from benchmarks.markdown import head, row
-from benchmarks.places import CMU_UNIT, DATA
 
 WINDOW = 60.0
 STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)

@@ -12,15 +12,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from benchmarks import markdown, path_shapes
+from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.path_editing.path_ride import figures
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import resample
 from beyond_mocap.path_editing.path_line import through
+from beyond_mocap.path_editing.path_ride import figures
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
-
-from benchmarks import markdown, path_shapes
-from benchmarks.places import CMU_UNIT, DATA
 
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
 CLIPS = {

@@ -11,10 +11,9 @@ from bpy_extras.io_utils import ImportHelper
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import areas, popup
+from ..scene.core import areas, popup, window
 from ..scene.timeline import video
 from ..scene.timeline.annotating import do, held, name_of, now, type_keys
-from ..scene.core import window
 from ..scene.timeline.video import drive
 from .verb import Verb
 

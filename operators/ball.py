@@ -7,18 +7,18 @@ from dataclasses import replace
 import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
+from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
 from ..beyond_mocap.base.settings.choices import BALLS, HOLDS, PARTS, SIDES
-from ..beyond_mocap.base.errors import InputError
-from ..scene.stage import ball as balls
-from ..scene.core import channels, linked
 from ..scene.ball import handover, shots
 from ..scene.ball.settings import aimed, aimed_ball
 from ..scene.ball.subject import ball_meant, body_meant, stretch_of, target_meant
+from ..scene.core import channels, linked
 from ..scene.core.measure import units_per_metre
+from ..scene.core.settings import active_player
 from ..scene.passes import hits_shown, possession, tracked
 from ..scene.passes.settings import KEPT, ball_of, found_of, subject
-from ..scene.core.settings import active_player
+from ..scene.stage import ball as balls
 from .verb import BackgroundVerb, Verb
 
 FAR = 10.0  # metres to a target that is made
@@ -319,7 +319,7 @@ class BEYOND_MOCAP_OT_solve_ball(BackgroundVerb, bpy.types.Operator):
     """Work out of the imported tracking who touches the ball and when, and its way between. The ball becomes an object,
 its touches proposals for key moments"""
 
-    bl_idname = "beyond_mocap.ball.solve_ball"
+    bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
     kind = "ball"
 

@@ -18,8 +18,8 @@ from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place
 from ..beyond_mocap.motion.quaternion import about_up, rotate
 from ..scene.core import action, channels
-from ..scene.rigs import armature, export
 from ..scene.library import assets, clips, foreign, recordings
+from ..scene.rigs import armature, export
 from ..scene.timeline import clip_annotation
 from .verb import BackgroundVerb, ImportVerb, Verb
 

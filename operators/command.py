@@ -12,8 +12,8 @@ _registered = []
 def run(arguments: list[str]) -> int:
     """Run one command line; returns its exit status."""
     from ..beyond_mocap.cli.main import main
-    from ..scene.rigs.deliver import WRITERS
     from ..scene.match import child
+    from ..scene.rigs.deliver import WRITERS
 
     return main(arguments, WRITERS, f"blender --command {NAME}", child.run)
 

@@ -12,11 +12,10 @@ from bpy.props import BoolProperty, StringProperty
 
 from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.base.errors import InputError
-from ..scene.timeline import clip_annotation
-from ..scene.library import clips, foreign, recordings, watch
-from ..scene.core import preferences, session
-from ..scene.core import window
+from ..scene.core import preferences, session, window
 from ..scene.core.settings import absolute, as_setting
+from ..scene.library import clips, foreign, recordings, watch
+from ..scene.timeline import clip_annotation
 from .verb import BackgroundVerb, Verb
 
 if TYPE_CHECKING:

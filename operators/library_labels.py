@@ -9,11 +9,11 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.timeline import clip_annotation, lanes, proposals
-from ..scene.library import clips, recordings
 from ..scene.core import preferences, session
-from ..scene.core.window import clear_status
 from ..scene.core.settings import absolute
+from ..scene.core.window import clear_status
+from ..scene.library import clips, recordings
+from ..scene.timeline import clip_annotation, lanes, proposals
 from .annotate import SPACES
 from .library import ClipVerb, FolderVerb
 from .verb import Verb

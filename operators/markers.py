@@ -12,9 +12,9 @@ from bpy_extras.io_utils import ExportHelper
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
 from ..scene.core import linked
+from ..scene.core.settings import as_setting
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
-from ..scene.core.settings import as_setting
 from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 
 

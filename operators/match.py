@@ -9,11 +9,11 @@ from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatPrope
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import areas, channels, session
-from ..scene.rigs import export, rig
-from ..scene.match import cameras, child, load, order, ours, reading, show
-from ..scene.match.settings import active_of, typed
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import as_setting
+from ..scene.match import cameras, child, load, order, ours, reading, show
+from ..scene.match.settings import active_of, typed
+from ..scene.rigs import export, rig
 from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85

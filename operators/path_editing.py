@@ -11,7 +11,8 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import linked
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import curve, keep_apart, measure, riders
-from ..scene.path_editing.settings import choose, meant, riders as riders_in
+from ..scene.path_editing.settings import choose, meant
+from ..scene.path_editing.settings import riders as riders_in
 from .verb import Verb
 
 

@@ -9,11 +9,11 @@ from bpy.props import EnumProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
-from ..scene.result import bake, plans, preview
-from ..scene.player import dots, pins, tracks
-from ..scene.timeline import strip_events, strips, word_checks
 from ..scene.core.settings import active_player, as_setting
+from ..scene.player import dots, pins, tracks
 from ..scene.player.subject import show
+from ..scene.result import bake, plans, preview
+from ..scene.timeline import strip_events, strips, word_checks
 from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}

@@ -5,11 +5,11 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, EnumProperty, IntProperty, StringProperty
 
-from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..beyond_mocap.base.errors import InputError
-from ..scene.result import error_curves, preview, variants
+from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import session
 from ..scene.core.settings import active_player
+from ..scene.result import error_curves, preview, variants
 from .turns import show_automatic
 from .verb import Verb
 

@@ -12,15 +12,14 @@ from bpy_extras.io_utils import ExportHelper, ImportHelper
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.bvh import bvh
 from ..scene.core import action, channels, session
-from ..scene.result import bake
-from ..scene.rigs import bone_maps, export, rig, rig_bake, rig_copy
 from ..scene.core.measure import frames_per_second
+from ..scene.core.settings import active_player
 from ..scene.path_editing import riders
-from ..scene.rigs import bake_record
+from ..scene.result import bake
+from ..scene.rigs import bake_record, bone_maps, export, rig, rig_bake, rig_copy
 from ..scene.rigs.driven import Driven, check
 from ..scene.rigs.fit import BakeOptions
 from ..scene.rigs.source import source_of
-from ..scene.core.settings import active_player
 from .verb import ExportVerb, Verb
 
 

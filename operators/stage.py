@@ -7,8 +7,8 @@ from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import areas
-from ..scene.stage import path_cameras, stage
 from ..scene.path_editing.settings import meant, riders
+from ..scene.stage import path_cameras, stage
 from .verb import Verb
 
 

@@ -9,8 +9,8 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import rows_of
 from ..scene.core import background, session
-from ..scene.result import freshness, orders, queue, stretch
 from ..scene.core.settings import active_player
+from ..scene.result import freshness, orders, queue, stretch
 from .turns import TurnsVerb
 
 
@@ -18,7 +18,7 @@ class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
     """Find clips for every ticked player's track and words, and join them into one motion.
 It is shown as a preview, until it is accepted or discarded. Players queue; ESC cancels"""
 
-    bl_idname = "beyond_mocap.synthesis.synthesize"
+    bl_idname = "beyond_mocap.synthesize"
     bl_label = "Synthesize"
 
 

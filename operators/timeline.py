@@ -9,12 +9,12 @@ from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import areas
-from ..scene.result import bake
-from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
 from ..scene.core.live import soon
 from ..scene.core.settings import active_player
-from ..scene.timeline.strip_lines import said
 from ..scene.player.subject import can_have, clock, name_of, subject, with_lanes
+from ..scene.result import bake
+from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
+from ..scene.timeline.strip_lines import said
 from .verb import Verb
 
 

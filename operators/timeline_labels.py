@@ -10,13 +10,13 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.annotation import format_timeline, read_timeline, swap_sides
 from ..beyond_mocap.base.errors import InputError
-from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
-from ..scene.result import plans
+from ..scene.core.settings import active_player, as_setting
 from ..scene.library import recordings
 from ..scene.player import tracks
-from ..scene.core.settings import active_player, as_setting
-from ..scene.timeline.strip_lines import said, words_of
 from ..scene.player.subject import clip, clock, name_of, subject, with_lanes
+from ..scene.result import plans
+from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
+from ..scene.timeline.strip_lines import said, words_of
 from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
 from .verb import ImportVerb, Verb
 

@@ -7,11 +7,11 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.drawn import FASTEST
-from ..scene.result import bake
-from ..scene.player import dots, drawn_track, pins
 from ..scene.core import linked
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player, is_track
+from ..scene.player import dots, drawn_track, pins
+from ..scene.result import bake
 from .player import free_name, shirt_for
 from .verb import Verb
 

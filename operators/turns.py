@@ -16,10 +16,10 @@ from bpy.props import StringProperty
 from ..beyond_mocap.annotation import Timeline
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, session
+from ..scene.core.window import start_clock, stop_clock
 from ..scene.player import dots
 from ..scene.result import freshness, orders, plans, preview, quality, queue, variants
 from ..scene.timeline import strips
-from ..scene.core.window import start_clock, stop_clock
 from .library import summary
 from .verb import Verb
 

@@ -9,9 +9,8 @@ from bpy.props import CollectionProperty, StringProperty
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import background
+from ..scene.core import background, window
 from ..scene.rigs import export
-from ..scene.core import window
 
 
 class Verb:

@@ -1,7 +1,7 @@
 """The plan of the house: which room may import which, and what the source really imports, read without running it.
 
-`tests/core/test_house.py` keeps the plan, `packaging/draw_house.py` draws it. Every import is written as one dotted name
-from the clone's top: `from ..plan import Plan` in `beyond_mocap/synthesis/search/wanted.py` is
+`tests/core/test_house.py` keeps the plan, `packaging/draw_house.py` draws it. Every import is written as one dotted
+name from the clone's top: `from ..plan import Plan` in `beyond_mocap/synthesis/search/wanted.py` is
 `beyond_mocap.synthesis.plan.Plan`.
 """
 
@@ -23,7 +23,8 @@ LAYERS = (
 )  # fmt: skip
 """The rooms of the core from the ground up: a room imports rooms of lower layers only, never one beside it."""
 GROUND_TRUTH = "synthetic.ground_truth"
-"""Recordings with known answers, made with the features that tests ask about them: above the features, below `match`."""
+"""Recordings with known answers, made with the features that tests ask about them: above the features, below
+`match`."""
 FILES_MAY = ("base", "motion", "annotation")
 BLENDER = {"bpy", "mathutils", "gpu", "gpu_extras", "bpy_extras", "blf", "bl_ui", "bl_operators", "bmesh",
            "addon_utils", "rna_prop_ui", "rna_keymap_ui", "imbuf", "aud", "idprop", "pxr"}  # fmt: skip
@@ -33,7 +34,8 @@ parse_source = functools.cache(ast.parse)
 
 
 class Import(NamedTuple):
-    """One imported name: where it stands, dotted from the top, whether inside a function, whether written relatively."""
+    """One imported name: where it stands, dotted from the top, whether inside a function, whether written
+    relatively."""
 
     where: str
     name: str

@@ -1,4 +1,5 @@
-"""Writes the tables of providers in docs/match/match-input.md from their records: python packaging/provider_tables.py"""
+"""Writes the tables of providers in docs/match/match-input.md from their records: python
+packaging/provider_tables.py"""
 
 import pathlib
 import re

@@ -5,8 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.ball.settings import aimed_ball
-from ..scene.passes import graph
-from ..scene.passes.settings import active_row, ball_of, subject, told_lines
+from ..scene.passes.settings import active_row, ball_of, picture_icon, subject, told_lines
 from .passes import passing
 from .stream import live, stream
 from .tab import Step, paragraph, section, split, table
@@ -48,7 +47,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
 def tracked(panel, layout, context) -> None:
     """The button, what was solved, and the touches."""
     settings = context.scene.beyond_mocap_passes
-    layout.operator("beyond_mocap.ball.solve_ball", icon="SPHERE")
+    layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
     panel.progress(context, "ball")
     if settings.solved:
         table(layout, settings.solved.splitlines())
@@ -84,7 +83,7 @@ def hits(layout, context) -> None:
     if not found.found:
         return
     row.operator("beyond_mocap.clear_hits", text="", icon="X")
-    if icon := graph.icon_of(found):
+    if icon := picture_icon(found):
         width = context.region.width / context.preferences.system.ui_scale - 2.5 * LINE
         layout.template_icon(icon, scale=max(6.0, min(width / LINE, 16.0)))
     for frame, text in told_lines(found.lines):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import bpy
 
-from .figure_lines import lines
-from ..scene.path_editing.settings import meant
 from ..scene.core.settings import active_player
+from ..scene.path_editing.settings import meant
+from .figure_lines import lines
 from .tab import Step, figures, paragraph, section, split
 
 OVERLAYS = {

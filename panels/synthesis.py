@@ -41,7 +41,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         layout, settings = self.layout, context.scene.beyond_mocap
         row = layout.row(align=True)
         row.scale_y = 1.3
-        row.operator("beyond_mocap.synthesis.synthesize", icon="ARMATURE_DATA")
+        row.operator("beyond_mocap.synthesize", icon="ARMATURE_DATA")
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
         self.queue(context)

@@ -19,8 +19,8 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.appearance.body import MATERIALS, BodyMesh, deformed, low_poly_body  # noqa: E402
+from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.humanoid import heading  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
 from beyond_mocap.motion.quaternion import turned_about_up  # noqa: E402

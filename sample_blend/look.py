@@ -18,13 +18,13 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
-from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
+from beyond_mocap.appearance.body import deformed, low_poly_body  # noqa: E402
 from beyond_mocap.base.errors import InputError  # noqa: E402
+from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.files.tables import read_ball  # noqa: E402
-from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
-from beyond_mocap.appearance.body import deformed, low_poly_body  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, pose_kinematics  # noqa: E402
+from beyond_mocap.synthesis.provenance import read_provenance  # noqa: E402
 
 COLOURS = np.array([(190, 140, 110), (200, 40, 35), (235, 235, 230), (40, 60, 150), (30, 30, 34), (40, 28, 22)], float)
 GRASS, LINE, SHADOW, SKY, BALL = (96, 140, 84), (134, 178, 118), (60, 92, 52), (200, 216, 232), (250, 250, 245)

@@ -4,8 +4,8 @@
 
 `static.trc` somebody who stands still, `throw.c3d` the same body and a ball with one marker thrown at 28 m/s,
 `walk.trc` another body walking, without a static trial, with gaps, a swap and an unlabeled stretch. Whatever is found
-in them can be compared with what was made (`beyond_mocap.synthetic.ground_truth.planted_markers`). The same code gives the same bytes. Needs
-the core and the C3D package."""
+in them can be compared with what was made (`beyond_mocap.synthetic.ground_truth.planted_markers`). The same code gives
+the same bytes. Needs the core and the C3D package."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
 from beyond_mocap.markers.files.trc_write import write_trc  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted  # noqa: E402
-from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall  # noqa: E402
 from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
 from beyond_mocap.motion.retargeting.adult import adult_skeleton  # noqa: E402
 from beyond_mocap.synthetic.gait import gait  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall  # noqa: E402
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted  # noqa: E402
 from beyond_mocap.synthetic.throws import throw  # noqa: E402
 
 SPEED, TARGET = 28.0, (18.0, 0.0, 1.0)

@@ -17,14 +17,14 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
+from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
+from beyond_mocap.base.runs import equal_runs  # noqa: E402
 from beyond_mocap.base.time_series import hann_smooth, interpolate  # noqa: E402
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
-from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
+from beyond_mocap.motion.motion import Motion  # noqa: E402
 from beyond_mocap.synthetic.gait import gait  # noqa: E402
 from beyond_mocap.synthetic.gestures import Gesture, dribble, strike  # noqa: E402
-from beyond_mocap.motion.motion import Motion  # noqa: E402
-from beyond_mocap.base.runs import equal_runs  # noqa: E402
 from beyond_mocap.synthetic.moves import celebration, getting_up, header, throw_in  # noqa: E402
 
 FPS = 30.0

@@ -4,8 +4,7 @@ A room for each feature, with what it does in its own docstring; docs/architectu
 `core`: channels, clock, background work, settings, registration, and the one live watcher.
 """
 
-from .core import session
-from .core import registration
+from .core import registration, session
 from .core.live import start_watching, stop_watching
 from .markers import kept
 from .match import child

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..motion.skeleton import Skeleton
-from .striking import Surface, part_surfaces, smallest_gap
 from .labels import find_label, list_labels, read_labels
+from .striking import Surface, part_surfaces, smallest_gap
 from .vocabulary import SIDES
 
 _BY_PART = {part: frozenset(list_labels(part=part)) for part in ("head", "chest", "hand", "foot")}

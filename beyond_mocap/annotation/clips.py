@@ -22,9 +22,9 @@ class ClipAnnotation:
     of the key moment (the foot meets the ball), None for continuous motions. words: from root to leaf plus
     modifiers."""
 
-    start: int
-    end: int
-    key: int | None
+    start: float
+    end: float
+    key: float | None
     words: tuple[str, ...]
 
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..base.errors import InputError
-from .striking import BODY_PARTS
 from .labels import list_labels
+from .striking import BODY_PARTS
 from .text import read_text
 from .timeline import checked_words
 from .vocabulary import SIDES, similar_words, vocabulary_words

@@ -62,7 +62,7 @@ def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray)
 def automatic_gaits(
     speed: np.ndarray,
     fps: float,
-    speeds: np.ndarray,
+    speeds: np.typing.ArrayLike,
     thresholds: np.ndarray,
     hysteresis: float = 0.2,
     minimum: float = 0.4,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..motion import quaternion
 from ..base.arctangent import arctan2
+from ..motion import quaternion
 from ..motion.track import SampledTrack, zero_phase_hann
 from .gaits import without_short_runs
 from .vocabulary import DIRECTIONS

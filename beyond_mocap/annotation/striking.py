@@ -79,7 +79,7 @@ def ball_gap(
     return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - ball_radius
 
 
-def nearest_on(line: tuple[np.ndarray, np.ndarray], place: np.ndarray) -> np.ndarray:
+def nearest_on(line: Sequence[np.ndarray], place: np.ndarray) -> np.ndarray:
     """The point (..., 3) m of a line from one end (..., 3) m to the other that is nearest to `place` (..., 3) m."""
     start, end = line
     along = end - start

@@ -187,7 +187,8 @@ def problems(
     """
     known = vocabulary_words(known_words)
     found: list[InputError] = []
-    for item in sorted((*timeline.spans, *timeline.keys), key=_first_time):
+    items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
+    for item in sorted(items, key=_first_time):
         place = where if item.line is None else f"{where}:{item.line}"
         found += [*_word_problems(item, known, place), *_time_problems(item, start, end, place)]
     return found + _overlaps(timeline, where)
@@ -281,7 +282,7 @@ def _range(start: float | None, end: float | None) -> str:
 def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
     """Spans with words that overlap, and key moments at one time: nobody can do both."""
     asked = [span for span in timeline.spans if span.words]
-    pairs = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
+    pairs: list[tuple] = [(a, b, "overlap") for a, b in zip(asked, asked[1:]) if b.start < a.end - _SAME_TIME]
     keys = timeline.keys
     pairs += [(a, b, "are at one time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [

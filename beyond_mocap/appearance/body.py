@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion import quaternion
-from ..motion.retargeting.adult import LEG
 from ..motion.humanoid import Humanoid, Limb, identify
 from ..motion.motion import Motion
+from ..motion.retargeting.adult import LEG
 from ..motion.retargeting.neutral import Neutral, neutral_stance, rests_upright
 from ..motion.skeleton import Skeleton, frozen_array
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.vectors import unit_vectors
-from .body import MATERIALS, deformed, low_poly_body
 from ..motion.humanoid import heading_from_positions
 from ..motion.motion import Motion, forward_kinematics, place
+from .body import MATERIALS, deformed, low_poly_body
 
 COLOURS = {
     "skin": (0.75, 0.55, 0.43), "shirt": (0.78, 0.16, 0.14), "shorts": (0.92, 0.92, 0.90), "socks": (0.16, 0.24, 0.59),

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.vectors import cross_level
 from ..base.errors import InputError
-from .body import SHIRT, BodyMesh, deformed
+from ..base.vectors import cross_level
 from ..motion.motion import Motion
 from ..motion.retargeting.neutral import neutral_stance
 from ..motion.skeleton import Skeleton, frozen_array
+from .body import SHIRT, BodyMesh, deformed
 
 _ABOVE = 0.004  # metres of the drawing over the cloth: more than rings of few sides dip in while they bend
 _MIDDLE = {"back": 0.70, "chest": 0.74}  # share of the shirt's height, from its hem, of the drawing's middle

@@ -10,13 +10,13 @@ late is taken.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 
-from ..base.errors import InputError
 from ..base.arctangent import arctan2
+from ..base.errors import InputError
 from . import batch
 from .physics import Ball, length
 
@@ -183,12 +183,12 @@ class _Problem:
         return cls(start, target, spin, np.broadcast_to(timed, shape[:1]).copy(), ball, int(bounces), ground)
 
     def at_time(self, seconds: np.ndarray) -> _Problem:
-        return _Problem(self.start, self.target, self.spin, seconds, self.ball, self.bounces, self.ground)
+        return replace(self, seconds=seconds)
 
     def only(self, which: np.ndarray) -> _Problem:
         """Some of the aims; an index may come again."""
-        rows = (value[which] for value in (self.start, self.target, self.spin, self.seconds))
-        return _Problem(*rows, self.ball, self.bounces, self.ground)
+        return replace(self, start=self.start[which], target=self.target[which], spin=self.spin[which],
+                       seconds=self.seconds[which])
 
     def arrived(self, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where the balls (B, 3) m are in time, and after how many bounces (B,); more bounces than asked for are not

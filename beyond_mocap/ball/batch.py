@@ -41,7 +41,7 @@ class Balls:
 
 
 def launched(
-    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0
+    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0
 ) -> Balls:
     """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is
     set onto the ground, and meets it at once where its way leads down."""
@@ -57,7 +57,9 @@ def launched(
 
 
 @np.errstate(over="ignore", invalid="ignore")  # launches that are tried may be faster than numbers go
-def after(balls: Balls, ball: Ball, seconds: np.ndarray, ground: float = 0.0, most_bounces: int | None = None) -> Balls:
+def after(
+    balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0, most_bounces: int | None = None
+) -> Balls:
     """The balls `seconds` (B,) or one number later. most_bounces: then they fly on through the ground (what a solver
     wants, whose targets must move smoothly with the launch)."""
     balls = Balls(*(value.copy() for value in vars(balls).values()))
@@ -73,7 +75,7 @@ def after(balls: Balls, ball: Ball, seconds: np.ndarray, ground: float = 0.0, mo
 
 
 def states(
-    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray,
+    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray,
     ground: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
@@ -86,7 +88,7 @@ def states(
 
 
 def courses(
-    position: np.ndarray, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
+    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
     ground: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (B, T, 3) of balls at `times` (T,) s after their launch, ascending and not negative."""
@@ -106,12 +108,12 @@ def _has_closed_form(balls: Balls, ball: Ball) -> bool:
 def _air(balls: Balls, which: np.ndarray, steps: np.ndarray, ball: Ball, low: float, most: int) -> np.ndarray:
     """One step of those that fly, up to the ground at most; how long it was (W,) s."""
     move = _closed if _has_closed_form(balls, ball) else _runge_kutta
-    start = tuple(_rows(value, which) for value in (balls.position, balls.velocity, balls.spin))
+    start = _rows(balls.position, which), _rows(balls.velocity, which), _rows(balls.spin, which)
     place, velocity, spin = move(*start, steps, ball)
     landing = np.flatnonzero((place[:, 2] < low) & (velocity[:, 2] < 0.0) & (balls.bounces[which] < most))
     if len(landing):
         steps = steps.copy()
-        before = tuple(_rows(value, landing) for value in start)
+        before = _rows(start[0], landing), _rows(start[1], landing), _rows(start[2], landing)
         under = (place[landing], velocity[landing])
         steps[landing] = _until_ground(move, before, under, steps[landing], ball, low)
         place[landing], velocity[landing], spin[landing] = move(*before, steps[landing], ball)

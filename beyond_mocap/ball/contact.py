@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.vectors import unit_vector, unit_vectors
+from ..annotation.striking import BODY_PARTS, Surface, part_surfaces
 from ..base.errors import InputError
+from ..base.vectors import unit_vector, unit_vectors
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, pose_kinematics
 from ..motion.skeleton import Skeleton
-from ..annotation.striking import BODY_PARTS, Surface, part_surfaces
 from ..motion.track import BALL_RADIUS
 
 PARTS = (*BODY_PARTS, "tool")
@@ -97,8 +97,8 @@ def struck_from(motion: Motion, frames: np.ndarray, surface: Surface) -> StruckF
     taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
     velocity = (after - before).mean(axis=0) * (motion.fps / np.maximum(taken, 1e-9))[:, None]
     back = quaternion.about_up(-heading)
-    own = [quaternion.rotate(back, line - root * [1.0, 1.0, 0.0]) for line in lines]
-    return StruckFrom(*own, surface.radius, quaternion.rotate(back, velocity))
+    start, end = (quaternion.rotate(back, line - root * [1.0, 1.0, 0.0]) for line in lines)
+    return StruckFrom(start, end, surface.radius, quaternion.rotate(back, velocity))
 
 
 def _lines(motion: Motion, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -30,7 +30,7 @@ class Launch:
     time: float
     position: np.ndarray
     velocity: np.ndarray
-    spin: np.ndarray = (0.0, 0.0, 0.0)
+    spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +60,19 @@ class Flight:
     rests_from: float | None
     end: float
 
-    def at(self, times: np.ndarray) -> np.ndarray:
+    def at(self, times: np.typing.ArrayLike) -> np.ndarray:
         """Positions (N, 3) m of the ball's centre at `times` (N,) s."""
         return self.states(times)[:, :3]
 
-    def velocity(self, times: np.ndarray) -> np.ndarray:
+    def velocity(self, times: np.typing.ArrayLike) -> np.ndarray:
         """Velocities (N, 3) m/s at `times` (N,) s; at a bounce the one after it."""
         return self.states(times)[:, 3:6]
 
-    def spin(self, times: np.ndarray) -> np.ndarray:
+    def spin(self, times: np.typing.ArrayLike) -> np.ndarray:
         """Spins (N, 3) rad/s about the world's axes at `times` (N,) s."""
         return self.states(times)[:, 6:]
 
-    def states(self, times: np.ndarray) -> np.ndarray:
+    def states(self, times: np.typing.ArrayLike) -> np.ndarray:
         """Position, velocity and spin (N, 9) at `times` (N,) s."""
         times = np.clip(np.asarray(times, float), self.launch.time, self.end)
         which = np.searchsorted([piece.first for piece in self.pieces], times, side="right") - 1
@@ -116,7 +116,8 @@ class _Integrator:
         self.velocity, self.spin = np.array(launch.velocity, float), np.array(launch.spin, float)
         self.pieces: list[Piece] = []
         self.bounces: list[float] = []
-        self.rolls_from = self.rests_from = None
+        self.rolls_from: float | None = None
+        self.rests_from: float | None = None
 
     def whole(self, landing: bool) -> Flight:
         if self.position[2] <= self.low and self.velocity[2] <= LEAST_HOP:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..annotation.striking import Surface
 from ..base.errors import InputError
 from ..motion.motion import Motion, at_frames, pose_kinematics
-from ..annotation.striking import Surface
 from .aim import CLOSE, Aimed, aim, along_ground, out_of_reach
 from .contact import StruckFrom, ball_centre
 from .physics import Ball, length

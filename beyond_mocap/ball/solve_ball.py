@@ -6,10 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
-from .tracked.solve import PITCH, SolvedBall, solve
 from ..base.errors import InputError
-from ..motion.track.match_data import REFEREE, Match
 from ..motion.track import Track
+from ..motion.track.match_data import REFEREE, Match
+from .tracked.solve import PITCH, SolvedBall, solve
 
 
 def solve_ball(

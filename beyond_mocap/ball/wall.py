@@ -13,7 +13,7 @@ _STEP = 0.004  # s between the places that are looked at
 
 def meets_wall(
     position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
-    spin: np.ndarray = (0.0, 0.0, 0.0),
+    spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> tuple[np.ndarray, float]:
     """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground
     where that comes first, and where it is after 6 s or four times what it would take without air where neither does.

@@ -18,7 +18,7 @@ def smoothstep(x: np.ndarray, start: float = 0.0, end: float = 1.0) -> np.ndarra
     return x * x * (3.0 - 2.0 * x)
 
 
-def quintic_step(x: np.ndarray) -> np.ndarray:
+def quintic_step(x: float | np.ndarray) -> np.ndarray:
     """0 below 0, 1 above 1, a quintic between whose slope and bend vanish at both ends.
 
     Args:
@@ -58,7 +58,7 @@ def hermite(share: np.ndarray, start, start_slope, end, end_slope) -> np.ndarray
         (2 * s3 - 3 * s2 + 1) * start + (s3 - 2 * s2 + share) * start_slope
         + (3 * s2 - 2 * s3) * end + (s3 - s2) * end_slope
     )  # fmt: skip
-State = tuple[float, np.ndarray, np.ndarray]
+State = tuple
 """A second, a place (2,) m and a velocity (2,) m/s."""
 
 

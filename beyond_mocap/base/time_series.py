@@ -47,7 +47,9 @@ def hann_smooth(values: np.ndarray, reach: int) -> np.ndarray:
     return np.convolve(np.pad(values, reach, mode="edge"), window / window.sum(), mode="valid")
 
 
-def interpolate(at: np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None) -> np.ndarray:
+def interpolate(
+    at: float | np.ndarray, times: np.ndarray, values: np.ndarray, outside: float | None = None
+) -> np.ndarray:
     """Values at other times, linearly between those that are known.
 
     Args:

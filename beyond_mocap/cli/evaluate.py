@@ -8,9 +8,8 @@ from pathlib import Path
 
 from ..base.settings.options import add_options
 from .library import open_library
-from .outputs import Writer, check_outputs
+from .outputs import Writer, add_take_files, check_outputs
 from .progress_reporter import Told
-from .outputs import add_take_files
 
 
 def add_evaluate(verbs) -> argparse.ArgumentParser:

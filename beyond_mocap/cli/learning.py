@@ -6,8 +6,8 @@ import csv
 import io
 from pathlib import Path
 
-from ..base.settings.options import add_options as add_settings
 from ..base.errors import InputError
+from ..base.settings.options import add_options as add_settings
 from .outputs import check_outputs
 from .progress_reporter import Told
 

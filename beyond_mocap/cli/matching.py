@@ -6,8 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ..base.settings.options import add_options, option_values
 from ..base.errors import BeyondMocapError, InputError
+from ..base.settings.options import add_options, option_values
 from .outputs import Writer, check_outputs, named_folder
 from .progress_reporter import Told
 
@@ -31,7 +31,7 @@ def add(verbs):
         "--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left"
     )
     add_options(verb, "match.section")
-    add_options(verb.add_mutually_exclusive_group(), "match.pieces.work")
+    add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
     add_options(verb, "library")
@@ -48,7 +48,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     order = MatchOrder(
         tracking=options.tracking, library=options.library, out=options.out, meta=options.meta, events=options.events,
         events_meta=options.events_meta, events_provider=options.events_provider, provider=options.provider,
-        **{**option_values(MatchOrder, options, "match.section", "match.pieces.work", "match", "library"),
+        **{**option_values(MatchOrder, options, "match.section", "match.work", "match", "library"),
            "players": tuple(dict.fromkeys(options.players)), "workers": options.workers or len(_cores())},
     )  # fmt: skip
     if options.apart is None:

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.settings.options import add_options
 from ..base.errors import InputError
+from ..base.settings.options import add_options
 from .outputs import Writer, named_folder
 from .progress_reporter import Told
 
@@ -19,7 +19,8 @@ from .progress_reporter import Told
 def add(verbs):
     """The verb's parser."""
     verb = verbs.add_parser("passes", help="several players keep a ball going")
-    verb.add_argument("scene", type=Path, metavar="SCENE.json", help="who passes to whom; docs/passes/passes.md has its form")
+    verb.add_argument("scene", type=Path, metavar="SCENE.json",
+                      help="who passes to whom; docs/passes/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
     verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
     add_options(verb, "library")
@@ -29,9 +30,9 @@ def add(verbs):
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`passes`: plays the scene and writes its players, its ball and what came of it."""
-    from ..passes.scene_json import read_scene
     from ..library.build import build
     from ..passes.passes import ball_of, passes
+    from ..passes.scene_json import read_scene
 
     begun = time.perf_counter()
     _check_folder(options.out)
@@ -129,8 +130,8 @@ def _of_player(player) -> dict:
 
 def _write(folder: Path, played, table: list[dict], report: dict) -> None:
     from ..files.bvh import bvh
-    from ..passes.strikes_csv import write_strikes
     from ..files.tables import write_ball, write_report
+    from ..passes.strikes_csv import write_strikes
     from ..synthesis.provenance import write_provenance
 
     folder.mkdir(exist_ok=True)

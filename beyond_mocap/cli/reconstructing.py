@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.settings.options import add_options, option_values
 from ..base.errors import InputError
+from ..base.settings.options import add_options, option_values
 from .outputs import Writer, check_outputs, writer_of
 from .progress_reporter import Told
 
@@ -48,8 +48,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 
 def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
-    from ..markers.files.model_json import write_model
     from ..files.tables import write_report
+    from ..markers.files.model_json import write_model
     from ..markers.reconstruct import reconstruct
 
     begun = time.perf_counter()
@@ -144,8 +144,8 @@ def _check_folder(out: Path, trials: Path) -> None:
 def _kept(made, options) -> dict:
     """Writes what became of one trial; its row of trials.json."""
     from ..files.bvh import bvh
-    from ..markers.files.model_json import write_model
     from ..files.tables import write_report
+    from ..markers.files.model_json import write_model
 
     name = made.recording.name
     row = {"trial": name, "file": str(made.recording.path), "session": made.recording.session, "error": made.error,
@@ -168,9 +168,9 @@ def _kept(made, options) -> dict:
 def _write_overview(rows, options, told: Told) -> None:
     """trials.json, and report.html where matplotlib is there to draw it."""
     from ..evaluation.plots import require_matplotlib
-    from ..markers.report.page import trials_report
     from ..files.tables import write_report
     from ..files.whole import atomic_write
+    from ..markers.report.page import trials_report
 
     write_report(options.out / "trials.json", {"trials": rows})
     try:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .. import __version__
-from ..base.settings.options import add_options, option_values
 from ..base.errors import InputError
+from ..base.settings.options import add_options, option_values
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 
@@ -27,8 +27,8 @@ def add(verbs):
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`release`: finds the release and writes what was asked for."""
     from ..files.bvh import bvh
-    from ..markers.files.marker_files import read_markers
     from ..files.tables import write_ball, write_report
+    from ..markers.files.marker_files import read_markers
     from ..markers.release.release import ReleaseSettings, release
 
     begun = time.perf_counter()

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.settings.options import add_options, option_values
 from ..base.errors import InputError
+from ..base.settings.options import add_options, option_values
 from .outputs import Writer, check_outputs, writer_of
 from .progress_reporter import Told
 
@@ -89,8 +89,8 @@ def _unit(clip, options) -> str:
 
 
 def _write_tables(options, take, report: dict | None) -> None:
-    from ..synthesis.provenance import write_provenance
     from ..files.tables import write_report
+    from ..synthesis.provenance import write_provenance
 
     if options.provenance:
         write_provenance(options.provenance, take)
@@ -100,8 +100,8 @@ def _write_tables(options, take, report: dict | None) -> None:
 
 def _path(options):
     """The new path."""
-    from ..path_editing.path_csv import read_curve
     from ..path_editing import path_line
+    from ..path_editing.path_csv import read_curve
 
     points = read_curve(options.path)
     try:
@@ -180,8 +180,8 @@ def _ridden(source, path, settings, ground, options):
 
 def _report(source, ridden, take, path, ground) -> dict:
     """The contract's report, and beside it how well the path was ridden."""
-    from ..path_editing.path_ride import figures
     from ..evaluation.report import evaluate, rounded
+    from ..path_editing.path_ride import figures
 
     ridden_well = rounded(figures(source, ridden, path, ground))
     if source.humanoid:

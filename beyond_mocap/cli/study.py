@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from ..base.settings.options import add_options
 from ..base.errors import InputError
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from .. import __version__
-from ..base.settings.options import add_options
 from ..base.errors import InputError
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 
@@ -25,11 +25,11 @@ def add(verbs):
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`throw evaluate`: generates every example anew and writes how far off it is."""
-    from ..throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
-    from ..throws.report.page import throws_page
-    from ..throws.network_npz import read_model
     from ..files.tables import write_report
     from ..files.whole import atomic_write
+    from ..throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
+    from ..throws.network_npz import read_model
+    from ..throws.report.page import throws_page
     from ..throws.throw_examples import TABLE_NAME
 
     begun = time.perf_counter()

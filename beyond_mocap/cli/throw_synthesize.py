@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import __version__
-from ..base.settings.options import add_options
 from ..base.errors import InputError, told_time
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs, writer_of
 from .progress_reporter import Told
 
@@ -189,7 +189,7 @@ class _Player:
         """The library's."""
         return self.library.skeleton
 
-    def place(self, at: float) -> tuple[float, float]:
+    def place(self, at: float) -> tuple[float, ...]:
         """(2,) m: where the track is at that second."""
         import numpy as np
 
@@ -198,9 +198,9 @@ class _Player:
 
     def joined(self, thrown, told: Told):
         """The throw within the player's motion, and lines for people."""
-        from ..throws.throw import within
         from ..throws.join_throw import join_throw, trim_waiting
         from ..throws.run_up import EDGE, construct_run_up
+        from ..throws.throw import within
 
         motion, release = trim_waiting(thrown.motion, thrown.release, EDGE)
         first = round((thrown.release - release) * thrown.motion.fps)

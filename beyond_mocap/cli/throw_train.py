@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from ..base.settings.options import add_options
 from ..base.errors import InputError
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 
@@ -39,12 +39,13 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
 def _require_training() -> None:
     """InputError, one line, where jax, optax or the project's `training` folder is missing: in Blender, say."""
-    core = __name__.partition(".commands.")[0]
+    core = __name__.partition(".cli.")[0]
     try:
         if core != "beyond_mocap":  # inside Blender the core has another name, and training knows it by this one
             raise ImportError
         import jax  # noqa: F401
         import optax  # noqa: F401
+
         import training  # noqa: F401
     except ImportError:
         raise InputError("throw train", FOUND, EXPECTED, NEXT_STEP) from None

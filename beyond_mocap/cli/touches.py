@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from .. import __version__
-from ..base.settings.options import add_options
 from ..base.errors import InputError, told_time
+from ..base.settings.options import add_options
 from .outputs import Writer, check_outputs
 from .progress_reporter import Told
 
@@ -36,9 +36,9 @@ def add(verbs):
 
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`touches`: solves the ball and writes what was asked for."""
+    from ..ball.solve_ball import solve_ball
     from ..files.tables import write_ball, write_report
     from ..files.touches_csv import write_touches
-    from ..ball.solve_ball import solve_ball
     from ..motion.track.ball_path import BallPath
 
     begun = time.perf_counter()

@@ -14,9 +14,9 @@ from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
 from ..synthesis.quality import feet, jerk, pieces, root
-from . import realism, words
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
+from . import realism, words
 from .reference import source_poses
 from .view import View
 
@@ -60,7 +60,7 @@ def keys(view: View) -> list[dict]:
 
 def _key(view: View, moment: Moment) -> dict:
     played, time = view.played, moment.asked.in_force
-    place = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
+    place: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
         error = root.root_error(played.pelvis, view.wanted, view.fps)
@@ -188,7 +188,7 @@ def poses(view: View) -> dict:
     curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
     own = _spread(view.own("smoothness"), ("mean", "p95", "max"))
     smoothness = {**_spread(curve, ("mean", "p95", "max")), **{f"source_{name}": value for name, value in own.items()}}
-    out = {"pose_realism": None, "smoothness_m": smoothness}
+    out: dict = {"pose_realism": None, "smoothness_m": smoothness}
     if view.reference is not None and np.isfinite(view.reference.pose_p95).all():
         distance = realism.nearest_distance(features / view.size, view.reference.poses)
         out["pose_realism"] = _mean(realism.unreal(distance, view.speed, view.reference.pose_p95))
@@ -251,11 +251,11 @@ def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> 
         view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss, asked=asked
     )
     if view.reference is None:
-        return lines
+        return [*lines]
     hard = jerk.jerk(view.played.positions, view.fps)
     ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
     told = jolts(view.played.times, view.seams, ratios)
-    return [*lines, told] if told else lines
+    return [*lines, told] if told else [*lines]
 
 
 def _mean(values: np.ndarray) -> float:

@@ -16,13 +16,22 @@ from ..annotation import Timeline
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality import jerk
-from . import plots
 from ..synthesis.quality.feet import contact_speeds
+from ..synthesis.quality.played import Played
+from . import plots
 from .html_page import (
-    Html, build_image, build_list, build_page, build_row, build_section, build_table, build_title, element, fragment,
+    Html,
+    build_image,
+    build_list,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    build_title,
+    element,
+    fragment,
 )
 from .judged import judged
-from ..synthesis.quality.played import Played
 from .view import View
 
 MOST_MOMENTS = 12

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from .report import flat
 from ..synthesis.quality.targets import target_of
+from .report import flat
 
 
 class Row(NamedTuple):

@@ -40,7 +40,8 @@ def judged(differences: np.ndarray) -> Comparison:
 
     off = np.asarray(differences, float)
     if not len(off):
-        return Comparison(off, *[np.nan] * 3, "t", *[np.nan] * 4)
+        none = float("nan")
+        return Comparison(off, none, none, none, "t", none, none, none, none)
     varies = len(off) > 1 and np.ptp(off) > 1e-12
     normal = float(shapiro(off).pvalue) if len(off) > 2 and varies else np.nan
     t_p = float(ttest_1samp(off, 0.0, alternative="less").pvalue) if varies else np.nan

@@ -6,6 +6,7 @@ Nothing is measured here that the report does not measure: `root`, `feet` and `j
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -102,12 +103,12 @@ def footprints(view: View) -> tuple[Footprint, ...]:
     played = view.played
     spans = feet.stances(played.contacts)
     travel = feet.stance_travel(played.feet[:, :, 1], spans)
-    found = [_footprint(view, *span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
+    found = [_footprint(view, span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
     return tuple(sorted(found, key=lambda print_: (print_.start, print_.side)))
 
 
-def _footprint(view: View, first: int, end: int, side: int, slide: float) -> Footprint:
-    played = view.played
+def _footprint(view: View, span: Sequence[int], slide: float) -> Footprint:
+    played, (first, end, side) = view.played, span
     heel, toe = played.feet[first:end, side, :, :2].mean(axis=0)
     along = toe - heel
     if np.hypot(*along) < 1e-3:  # no toe joint: the foot points where the body goes

@@ -11,13 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import InputError
+from ..base.runs import runs
 from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate
-from ..base.runs import runs
 from ..motion.track import BALL_RADIUS
-from . import figures, realism
 from ..synthesis.quality import pieces, root
+from . import figures, realism
 from .view import View
 
 WIDTH = 11.0
@@ -56,7 +56,7 @@ def legend(view: View) -> dict[int, tuple[int, str]]:
     from matplotlib import colormaps
     from matplotlib.colors import to_hex
 
-    table = [to_hex(c) for c in (*colormaps["Set2"].colors, *colormaps["Pastel1"].colors, *colormaps["Set3"].colors)]
+    table = [to_hex(c) for name in ("Set2", "Pastel1", "Set3") for c in getattr(colormaps[name], "colors")]
     used, counts = np.unique(view.played.clip[view.played.clip >= 0], return_counts=True)
     order = used[np.argsort(-counts, kind="stable")]
     return {int(clip): (place + 1, table[place % len(table)]) for place, clip in enumerate(order)}

@@ -125,7 +125,8 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
     windows = [jerk.uncut_windows(recording.jerk, recording.speed) for recording in measured]
-    jerk_p95 = jerk.real_p95(*(np.concatenate(column) for column in zip(*windows)))
+    hard, speed = (np.concatenate(column) for column in zip(*windows))
+    jerk_p95 = jerk.real_p95(hard, speed)
     poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
     joined = {name: _joined(measured, name) for name in _PER_FRAME}
     return LibraryReference(

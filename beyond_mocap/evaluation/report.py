@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,10 @@ from ..annotation import Timeline
 from ..base.errors import InputError, spans_of
 from ..library.library import Library
 from ..motion.track import Track
-from ..synthesis.take import Take
-from . import figures
 from ..synthesis.quality.moments import dribble_touches
 from ..synthesis.quality.played import Played, played_from_take
+from ..synthesis.take import Take
+from . import figures
 from .view import View
 
 VERSION = 1
@@ -128,14 +129,14 @@ def check_depth(value, where: object) -> None:
         level, depth = [entry for entries in inner for entry in entries], depth + 1
 
 
-def flat(report: Mapping) -> dict[str, object]:
+def flat(report: Mapping) -> dict[str, Any]:
     """A report as one row per figure: nested names joined with dots, key moments numbered from 1, warnings counted.
     InputError as `check_depth`."""
     check_depth(report, "report")
     return _flat(report, "")
 
 
-def _flat(value, name: str) -> dict[str, object]:
+def _flat(value, name: str) -> dict[str, Any]:
     if name == "warnings":
         return {name: len(value)}
     if name == "warning_seconds":

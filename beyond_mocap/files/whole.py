@@ -26,8 +26,8 @@ def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
         yield part
         os.replace(part, path)
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, found, "a folder that can be written", "choose another place") from None
+        what = f"cannot be written ({error.strerror or error})"
+        raise InputError(path, what, "a folder that can be written", "choose another place") from None
     finally:
         with contextlib.suppress(OSError):
             part.unlink()
@@ -51,8 +51,8 @@ def whole_folder(path: str | os.PathLike) -> Iterator[Path]:
         for one in sorted(part.iterdir()):
             os.replace(one, path / one.name)
     except OSError as error:
-        found = f"cannot be written ({error.strerror or error})"
-        raise InputError(path, found, "a folder that can be written", "choose another place") from None
+        what = f"cannot be written ({error.strerror or error})"
+        raise InputError(path, what, "a folder that can be written", "choose another place") from None
     except InputError as error:  # of a file in it, which has its name from now on
         where, _, rest = str(error).replace(str(part), str(path)).partition(": ")
         raise InputError(where, rest) from None

@@ -11,8 +11,8 @@ from typing import Callable, Iterable
 from ..annotation import ClipAnnotation
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
-from ..synthetic.landing import ends_in_flight
 from ..motion.motion import Motion
+from ..synthetic.landing import ends_in_flight
 from . import cache, landings, one_skeleton, repair
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks

@@ -36,7 +36,7 @@ _FRAME_ARRAYS = (
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
     """A hash of names and contents of all files that a build reads, the options, and this file's VERSION."""
-    parts = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
+    parts: list[str | bytes] = [json.dumps([VERSION, str(np.__version__), options], sort_keys=True)]
     for path in [*clips, *sources, *([skeleton] if skeleton else [])]:
         parts.append(os.fsencode(os.path.relpath(path, folder)) + b"\0")
         try:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .clip import Clip
-from .features import Frames, describe
-from .features import FPS
+from .features import FPS, Frames, describe
 
 
 def described(clips, like: Frames | None = None) -> Frames:

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from ..annotation import CONTINUOUS, DISCRETE, VOCABULARY, nearest, spoken
@@ -46,7 +47,7 @@ def _key_words(clip, row) -> frozenset[str]:
     return frozenset(row.words) | (frozenset(word for words in others for word in words) - _SIDES)
 
 
-def serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
+def serving(keys: Iterable[Key], words) -> tuple[Key, ...]:
     """The keys that carry all of `words`; of these the ones that show the fewest other actions beside: a dive is also a
     jump, but who asks for a jump wants no dive where there is another."""
     wanted = frozenset(words)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation
-from ..synthetic.landing import ends_in_flight, landed
 from ..motion.motion import Motion
+from ..synthetic.landing import ends_in_flight, landed
 from ..synthetic.moves import getting_up
 from .scan import CACHE_FOLDER
 
@@ -46,7 +46,7 @@ class Completed:
 def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray]]) -> list[WayUp]:
     """Every way of getting up among clips (motion, rows, standing) of one skeleton; a made one where they show none."""
     found = [
-        WayUp(motion.frames(row.start, row.end + 1), standing[row.start : row.end + 1], row.words)
+        WayUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
         for motion, rows, standing in clips
         for row in rows
         if "getting_up" in row.words and row.end - row.start > motion.fps and not ends_in_flight(motion)

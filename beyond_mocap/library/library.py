@@ -9,14 +9,14 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Callable
+from typing import Any, Callable
 
 import numpy as np
 
 from ..annotation import LOCOMOTION, ClipAnnotation, recorded_thresholds
-from ..base.errors import InputError
 from ..annotation.gaits import STANDING
 from ..annotation.vocabulary import DIRECTIONS
+from ..base.errors import InputError
 from ..motion.skeleton import Skeleton
 from . import cache
 from .clip import Clip
@@ -103,7 +103,7 @@ class Library:
         where no recording shows locomotion."""
         measure_gaits(self)  # a library without locomotion stays an error
         found = cache.load(*self.kept, "made") if self.kept else None
-        made = found and Library(folder="", **found)
+        made = Library(folder="", **found) if found else None
         if made is None:
             made = _made(self)
             if self.kept:
@@ -185,8 +185,8 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
     nor do made clips of a gait that is recorded, nor other clips than the chosen one, nor rows that a slower one would
     overtake in the mean (then the word is dropped, since thresholds need an order).
     """
-    seconds: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
-    metres: dict[str, Counter] = {word: Counter() for word in LOCOMOTION}
+    seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
+    metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
     step = np.linalg.norm(np.diff(frames.path, axis=0), axis=1)
     chosen = dict(library.chosen)

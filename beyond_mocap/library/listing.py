@@ -16,8 +16,8 @@ import numpy as np
 from ..annotation import ClipAnnotation, spoken
 from ..base.errors import InputError
 from . import cache
-from .converted import Conversions, is_foreign
 from .clip import Clip
+from .converted import Conversions, is_foreign
 from .library import Library
 from .scan import Annotations, own_recordings
 

@@ -26,19 +26,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..annotation import DISCRETE, ClipAnnotation, gait_thresholds
-from ..base.vectors import cross
-from ..annotation import LOCOMOTION
-from ..motion import contacts, quaternion
-from ..synthetic import gestures
+from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, gait_thresholds
 from ..base.arctangent import arctan2
-from ..synthetic.course import GaitStyle
-from ..synthetic.gait import gait
+from ..base.runs import equal_runs, runs
+from ..base.vectors import cross
+from ..motion import contacts, quaternion
+from ..motion.foot_plant import plant
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics
 from ..motion.phase_blend import Strides, blend, strides
-from ..base.runs import equal_runs, runs
-from ..motion.foot_plant import plant
+from ..synthetic import gestures
+from ..synthetic.course import GaitStyle
+from ..synthetic.gait import gait
 from .features import Frames
 from .scan import CACHE_FOLDER
 
@@ -134,7 +133,8 @@ def made_clips(
 
 
 def upright_example(clips: Sequence) -> Motion:
-    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way this skeleton
+    """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way
+    this skeleton
     stands. A single recording of a run leans, and made running would lean twice."""
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored
@@ -151,7 +151,8 @@ def runner_style(clips: Sequence, frames: Frames, example: Motion) -> GaitStyle:
         return GaitStyle()
     rows = rows[np.linspace(0, len(rows) - 1, 60).astype(int)]
     shown = [at_frames(clips[frames.clip[row]].motion, frames.source[row : row + 1]) for row in rows]
-    recorded = Motion(example.skeleton, *(np.concatenate(column) for column in zip(*shown)), 30.0)
+    root, rotations = (np.concatenate(column) for column in zip(*shown))
+    recorded = Motion(example.skeleton, root, rotations, 30.0)
     made = gait(min(float(frames.speed[rows].mean()), FASTEST), 1.5, 30.0, example.skeleton, example=example)
     elbow, lean = np.clip(_elbow_and_lean(recorded) - _elbow_and_lean(made), -_STYLE, _STYLE)
     return GaitStyle(elbow=float(elbow), lean=float(lean))

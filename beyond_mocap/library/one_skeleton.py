@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,7 +43,7 @@ def bring(
     for group in groups:
         if group[0] not in home:
             sample, down = _sample([motions[i] for i in group], [standing[i] for i in group])
-            known = {"example": example, "standing": down, "example_standing": feet}
+            known: dict[str, Any] = {"example": example, "standing": down, "example_standing": feet}
             rig = _named(paths[group[0]], lambda: Retargeter(sample, skeleton, **known))
             rigs.update(dict.fromkeys(group, rig))
     if rigs:
@@ -55,7 +56,8 @@ def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | P
     """`motion` on the skeleton of `target`, a recording or a pose of it, feet held where they stood; its rate and
     floor.
 
-    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as there.
+    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as
+    there.
     """
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(

@@ -23,13 +23,13 @@ from scipy.signal import find_peaks
 from ..annotation import LOCOMOTION, ClipAnnotation, automatic_gaits
 from ..annotation.gaits import STANDING, without_short_runs
 from ..annotation.labels import find_label
+from ..annotation.striking import part_surfaces
 from ..annotation.vocabulary import DIRECTIONS
-from ..motion import contacts, quaternion
 from ..base.arctangent import arctan2
+from ..base.runs import equal_runs, runs
+from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
-from ..base.runs import equal_runs, runs
-from ..annotation.striking import part_surfaces
 from .library import Library
 from .proposal import Proposal
 

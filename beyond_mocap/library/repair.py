@@ -22,12 +22,12 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.runs import runs
 from ..motion import contacts, quaternion
+from ..motion.foot_plant import plant
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
-from ..base.runs import runs
 from ..motion.track import zero_phase_hann
-from ..motion.foot_plant import plant
 
 # a rotation that jumps by more than this (radians) and by so many times what its neighbours move, and returns
 _POP = np.radians(12.0)

@@ -30,8 +30,8 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
     none."""
     folder = Path(folder)
     if not folder.is_dir():
-        found = "no folder but a file" if folder.is_file() else "no such folder"
-        raise InputError(folder, found, "a folder with BVH files", "give the folder of your library")
+        what = "no folder but a file" if folder.is_file() else "no such folder"
+        raise InputError(folder, what, "a folder with BVH files", "give the folder of your library")
     found: list[Path] = []
     seen: set[tuple[int, int]] = set()
     for here, folders, files in os.walk(folder, followlinks=True):

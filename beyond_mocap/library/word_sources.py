@@ -63,8 +63,10 @@ def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) ->
 
 def sources_in_table(path: Path, name: str, rows: tuple[ClipAnnotation, ...]) -> Found:
     """The sources of a clip's rows in a table that has the columns; `name` as its column `file` spells it."""
-    spelled = {(str(row.start), str(row.end), "" if row.key is None else str(row.key), " ".join(row.words)): row
-               for row in rows}
+    spelled: dict[tuple, ClipAnnotation] = {
+        (str(row.start), str(row.end), "" if row.key is None else str(row.key), " ".join(row.words)): row
+        for row in rows
+    }
     out = {}
     for line in csv.DictReader(io.StringIO(read_text(path), newline="")):
         file, source, sure, *there = ((line.get(column) or "").strip() for column in ("file", *COLUMNS, *_ROW))

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from .. import __version__
-from ..base.settings import defaults, setting
 from ..base.errors import Cancelled, InputError
+from ..base.settings import defaults, setting
+from ..motion.motion import Motion
 from .cleaning.clean import Cleaned, clean
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, Solved, solve
 from .trial import MarkerTrial
-from ..motion.motion import Motion
 
 _DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
@@ -174,7 +174,11 @@ class _Road:
         """The progress of a part of the way, from 0 to 1, as that of the whole."""
         if self._progress is None:
             return None
-        return lambda fraction, text="": self._progress(low + (high - low) * fraction, text)
+
+        def report(fraction: float, text: str = "") -> None:
+            self._progress(low + (high - low) * fraction, text)
+
+        return report
 
     def tell(self, lines) -> None:
         """Lines for people, each once."""
@@ -256,8 +260,8 @@ def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Clean
 
 
 def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
-    from .model.calibrate import calibrate
     from .checks import some
+    from .model.calibrate import calibrate
 
     try:
         return calibrate(marker_set, trial, still, progress=progress, cancelled=cancelled)

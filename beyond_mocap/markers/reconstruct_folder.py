@@ -16,8 +16,8 @@ from pathlib import Path
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from .checks import check
 from .model.model import MarkerModel
-from .trial import MarkerTrial
 from .reconstruct import Reconstruction, ReconstructSettings, modelled, named_by, reconstruct, set_of
+from .trial import MarkerTrial
 
 SUFFIXES = (".c3d", ".trc")
 _STATIC = re.compile(r"static|calib|(^|[^a-z])cal([^a-z]|$)|[tna][-_ ]?pose|standing", re.IGNORECASE)

@@ -18,21 +18,21 @@ from ..library.chosen import with_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
-from ..synthesis.plan import Plan
-from ..synthesis.construct.hand_over import handed_over
+from ..motion.track.ball_path import BallPath
 from ..synthesis.construct.ball.meeting import eased
+from ..synthesis.construct.hand_over import handed_over
+from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList, at_times
 from ..synthesis.search.footage import shown
-from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.synthesize import constructed
-from ..motion.track.ball_path import BallPath
 from ..synthesis.take import Take
-from .pieces.cut_plan import cut_plan
 from .joined_takes import one_take, own_part
+from .pieces.cut_plan import cut_plan
 from .pieces.library_clips import bound
 from .pieces.named_edit import part
-from .player_edit import PlayerEdit, Stretch
 from .pieces.units import frame_count, layout_edges
+from .player_edit import PlayerEdit, Stretch
 
 AROUND = 4.0
 """Seconds on either side of a window that are laid out too."""

@@ -253,6 +253,6 @@ def _take(file) -> None:
         import msvcrt
 
         file.seek(1 << 20)  # a byte that nobody reads: what is locked there cannot be read by others
-        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]  # Windows alone has it
         return
     fcntl.flock(file.fileno(), fcntl.LOCK_EX | fcntl.LOCK_NB)

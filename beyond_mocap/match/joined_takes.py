@@ -10,8 +10,8 @@ import numpy as np
 from ..annotation import Span, Timeline
 from ..base.errors import spans_of
 from ..motion.motion import concatenate
-from ..synthesis.plan import Plan
 from ..motion.track.ball_path import BallPath
+from ..synthesis.plan import Plan
 from ..synthesis.take import DribbleTouch, Take
 
 _SAME_TIME = 1e-6

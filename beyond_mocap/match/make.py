@@ -14,29 +14,29 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ball.solve_ball import solve_ball
 from ..ball.tracked.solve import SolvedBall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.events.event_data import MatchEvents
 from ..files.events.events import read_events
-from ..motion.track.match_data import Match
 from ..files.tables import write_ball
 from ..files.tracking.tracking import read_match
 from ..files.whole import atomic_write
-from ..library.library import Library
 from ..library.build import build
-from ..ball.solve_ball import solve_ball
+from ..library.library import Library
 from ..motion.track.ball_path import BallPath
-from .pieces import stages
+from ..motion.track.match_data import Match
 from .folder import check_folder, file_names, opened, read_state
+from .labels.words import MatchWords, words_of
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
+from .pieces import stages
 from .pieces.pool import Workplace, check_place, ended
+from .pieces.workplace_library import LibrarySource, hold
+from .report.thumbnails import thumbnails
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import begun, now, row_of
-from .report.thumbnails import thumbnails
-from .labels.words import MatchWords, words_of
-from .pieces.workplace_library import LibrarySource, hold
 
 AROUND = 5.0
 """Seconds before and behind the span in which the ball is solved too."""
@@ -198,7 +198,7 @@ def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd)
     fps = job.order.fps
     first, last = int(np.ceil(span[0] * fps - 1e-6)), int(np.floor(span[1] * fps + 1e-6))
     times = np.arange(first, last + 1) / fps
-    plan = ball_plan(match, solved, *span, fps)
+    plan = ball_plan(match, solved, span[0], span[1], fps)
     if plan is None:
         return BallPath(times, np.full((len(times), 3), np.nan), np.zeros(len(times), bool))
     ball = met(course(plan, times), first, ((part.led_frames, part.led) for part in crowd.values()))

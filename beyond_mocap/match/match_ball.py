@@ -8,11 +8,11 @@ import numpy as np
 
 from ..ball.tracked.solve import SolvedBall
 from ..base.time_series import interpolate
+from ..motion.track import Track, clean
+from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from ..synthesis.known_touches import course_of
-from ..motion.track import Track, clean
 from ..synthesis.plan import Plan
-from ..motion.track.ball_path import BallPath
 from ..synthesis.take import Take
 
 _STEP = 1e-4  # m, to which places are rounded, as files have them

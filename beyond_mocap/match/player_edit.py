@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..synthesis.known_touches import solve_touches
 from ..motion.track import Track
+from ..synthesis.known_touches import solve_touches
 from ..synthesis.plan import Plan, SolvedCourse
 from .crowd.correction import Correction
 from .pieces.named_edit import NamedEdit

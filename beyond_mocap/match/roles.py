@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.time_series import interpolate
 from ..base.errors import InputError, told_time
-from ..motion.track.match_data import Match, MatchPlayer
+from ..base.time_series import interpolate
 from ..motion.track import Track, clean
+from ..motion.track.match_data import Match, MatchPlayer
 from .crowd.spacing import keeping, spaced
-from .pieces.cut_plan import cut_track
-from .order import MatchOrder
 from .crowd.variety import lags
+from .order import MatchOrder
+from .pieces.cut_plan import cut_track
 
 SHORTEST = 1.0
 """Seconds; who is there for less is not made."""

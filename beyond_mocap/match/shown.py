@@ -10,11 +10,11 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..library.library import Library
+from ..motion.track.ball_path import BallPath
+from ..synthesis.synthesize import look_of
+from ..synthesis.take import Take
 from .crowd.attention import looking
 from .crowd.correction import Correction, applied
-from ..synthesis.synthesize import look_of
-from ..motion.track.ball_path import BallPath
-from ..synthesis.take import Take
 from .crowd.restore_ball_contact import at_ball
 from .expand import expanded
 from .joined_takes import own_part

@@ -1,4 +1,5 @@
-"""What match.json says: the order, who is made and how far he is, what was told, and what it took (docs/match/match.md)."""
+"""What match.json says: the order, who is made and how far he is, what was told, and what it took
+(docs/match/match.md)."""
 
 from __future__ import annotations
 

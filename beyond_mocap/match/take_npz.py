@@ -1,5 +1,5 @@
-"""ID.take.npz: all that is kept of a player of a match (docs/match/match.md): a zip of plain arrays of whole numbers and a
-few fractions, with one JSON text for what is no array. Places are in millimetres and times in microseconds, as
+"""ID.take.npz: all that is kept of a player of a match (docs/match/match.md): a zip of plain arrays of whole numbers
+and a few fractions, with one JSON text for what is no array. Places are in millimetres and times in microseconds, as
 differences of differences, which pack well."""
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline
 from ..base.errors import InputError
-from .pieces.named_edit import NamedEdit, NamedKey
-from .player_edit import PlayerEdit, Stretch, course_times
-from ..motion.track import Track
-from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
-from .crowd.correction import Correction
 from ..files.content import content
 from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
 from ..files.plain_npz import HEADER, header_text, plain_arrays
 from ..files.whole import atomic_write
+from ..motion.track import Track
+from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
+from .crowd.correction import Correction
+from .pieces.named_edit import NamedEdit, NamedKey
+from .player_edit import PlayerEdit, Stretch, course_times
 
 VERSION = 1
 FORMAT = "Beyond Mocap player of a match"
@@ -302,5 +302,5 @@ def _named_key(value, clips: int, where: str) -> NamedKey:
     time, clip, frame, start, end, words = _row(value, f"{where}: placed", 6)
     if not 0 <= whole_number(clip, where) < clips:
         raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
-    times = (number(each, f"{where}: placed") for each in (frame, start, end))
-    return NamedKey(number(time, where), whole_number(clip, where), *times, _words(words, where))
+    frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
+    return NamedKey(number(time, where), whole_number(clip, where), frame, start, end, _words(words, where))

@@ -13,9 +13,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import grey_opening, maximum_filter1d
 
+from ..base.runs import run_numbers, runs
 from .humanoid import Humanoid, identify, leg_length
 from .motion import Motion, forward_kinematics
-from ..base.runs import run_numbers, runs
 from .skeleton import Skeleton
 
 _ENVELOPE_SECONDS = 2.0  # longer than a walk's cycle: every foot has stood once within it

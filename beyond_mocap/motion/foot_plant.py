@@ -16,17 +16,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from ..base.arctangent import arctan2
 from ..base.banded_least_squares import BandedLeastSquares
+from ..base.runs import run_numbers
 from ..base.time_series import hann_smooth
 from ..base.vectors import cross
 from . import quaternion
-from ..base.arctangent import arctan2
 from .contacts import sole_height
 from .humanoid import Limb, identify
 from .motion import pose_kinematics
-from ..base.runs import run_numbers
-from .skeleton import Skeleton
 from .reach import two_bone
+from .skeleton import Skeleton
 
 SMOOTH, PULL = 0.005, 3e-4
 """Weights of `shift`."""
@@ -119,7 +119,8 @@ def plant(
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. The feet keep their own rotation but for a turn
     about the vertical that holds a flat foot's direction, and for heels that rise where a leg could not reach; the
     pelvis is lowered where that is not enough, by at most `sinks` metres. moves (T, 2, 4): metres by which each foot is
-    moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels: standing feet are
+    moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels:
+    standing feet are
     brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
     own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
     """

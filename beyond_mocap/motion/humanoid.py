@@ -15,11 +15,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from . import quaternion
-from .retargeting import structure
-from ..base.arctangent import arctan2
 from .motion import Motion, forward_kinematics, pose_kinematics
+from .retargeting import structure
 from .skeleton import Skeleton
 
 # canonical limb part -> names without side, blanks and prefix, in order of preference

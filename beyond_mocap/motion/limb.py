@@ -24,7 +24,7 @@ def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.nd
     return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
 
 
-def inner_angle(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.ndarray:
+def inner_angle(upper, lower, length) -> np.ndarray:
     """The angle between two bones at the joint between them, by the law of cosines.
 
     Args:
@@ -37,7 +37,8 @@ def inner_angle(upper: np.ndarray, lower: np.ndarray, length: np.ndarray) -> np.
 
 
 def bend(
-    top: np.ndarray, target: np.ndarray, upper: np.ndarray, lower: np.ndarray, pole: np.ndarray, soft: float = 0.01
+    top: np.ndarray, target: np.ndarray, upper: np.ndarray, lower: np.ndarray, pole: np.ndarray,
+    soft: float | np.ndarray = 0.01,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Middle joint (..., 3), end joint (..., 3) and hinge axis (..., 3) of a limb that reaches for `target`.
 

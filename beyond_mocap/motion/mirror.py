@@ -90,7 +90,7 @@ def _chosen(motion: Motion, body: Humanoid, rest: np.ndarray, pairs) -> list[np.
             chosen.append(chosen[partner])
             continue
         before = chosen[motion.skeleton.parents[joint]] if joint else None
-        chosen.append(_choose(usual, *pairs[joint], before, mean[joint], mean[partner]))
+        chosen.append(_choose(usual, pairs[joint], before, mean[joint], mean[partner]))
     return chosen
 
 
@@ -108,12 +108,14 @@ def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndar
     return bones[:, 0], bones[:, 1]
 
 
-def _choose(usual, bones, images, before, mean, partner_mean) -> np.ndarray:
-    """The D (3, 3) of a joint from `usual` (D, 3, 3): how well it carries bones to bones, and the mean local rotations.
+def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
+    """The D (3, 3) of a joint from `usual` (D, 3, 3): how well it carries bones to bones (`pair`), and the mean
+    local rotations.
 
     In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average. `before`: the
     parent's D, None at the root, whose rotation has no parent to be compared with.
     """
+    bones, images = pair
     length = max(np.sum(bones**2), 1e-12)
     misfit = np.sum((bones @ usual.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length
     cost = _GEOMETRY_WEIGHT * misfit

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.vectors import cross, unit_vectors
 from ..base.arctangent import arctan2
+from ..base.vectors import cross, unit_vectors
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)
@@ -57,7 +57,7 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return v + w * t + cross(u, t)
 
 
-def about_axis(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
+def about_axis(axis: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
     """Rotation by `angle` (...,) radians about unit `axis` (..., 3): (..., 4)."""
     half = 0.5 * np.asarray(angle, dtype=float)
     return np.concatenate([np.cos(half)[..., None], np.sin(half)[..., None] * np.asarray(axis, dtype=float)], axis=-1)
@@ -198,7 +198,7 @@ def signed_like(q: np.ndarray, like: np.ndarray) -> np.ndarray:
     return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
 
 
-def slerp(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def slerp(a: np.ndarray, b: np.ndarray, weight: float | np.ndarray) -> np.ndarray:
     """Spherical interpolation on the short way (Faustino eq. 8): (..., 4), (..., 4), (...,) -> (..., 4)."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
     weight = np.asarray(weight, dtype=float)
@@ -218,6 +218,6 @@ def yaw(q: np.ndarray) -> np.ndarray:
     return 2.0 * arctan2(q[..., 3], q[..., 0])
 
 
-def wrapped(angle: np.ndarray) -> np.ndarray:
+def wrapped(angle):
     """Angles (...) in radians without their full turns: from -pi up to pi."""
     return (angle + np.pi) % (2.0 * np.pi) - np.pi

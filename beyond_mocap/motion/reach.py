@@ -7,15 +7,16 @@ bent."""
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from ..base.vectors import cross, unit_vectors
 from ..base.errors import InputError
+from ..base.vectors import cross, unit_vectors
 from . import limb, quaternion
 from .motion import pose_kinematics
-from .skeleton import Skeleton
 from .retargeting.structure import path
+from .skeleton import Skeleton
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
 CLEAR_BEND = 0.06
@@ -55,7 +56,7 @@ def two_bone(
     """
     _check_chain(skeleton, joints)
     places, world = pose_kinematics(skeleton, root, rotations)
-    end = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
+    end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}
     found, miss = bent_limb(skeleton, places, world, joints, target, pole=pole, soft=soft, **end)
     out = np.array(rotations, dtype=float)
     for joint, local in found.items():

@@ -70,7 +70,7 @@ class Skeleton:
                 joint = self.parents[joint]
         kept = sorted(found)
         parents = [-1 if joint == 0 else kept.index(self.parents[joint]) for joint in kept]
-        return Skeleton([self.names[joint] for joint in kept], parents, self.offsets[kept]), kept
+        return Skeleton(tuple(self.names[joint] for joint in kept), tuple(parents), self.offsets[kept]), kept
 
     def scaled(self, size: float) -> "Skeleton":
         """The skeleton of a body `size` times as large."""

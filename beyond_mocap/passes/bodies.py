@@ -3,7 +3,8 @@ between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
 `passes.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
-(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball is never moved.
+(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball
+is never moved.
 """
 
 from __future__ import annotations
@@ -15,39 +16,39 @@ import numpy as np
 
 from ..annotation import Timeline, automatic_gaits
 from ..annotation.gaze import wanted_offset
+from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
-from .alike import alike
 from ..ball.contact import striking_surface
-from .links import BoneWeights
-from .orders import HitOrder, Stance
-from .way import Placed, needed, placed, way
+from ..base.arctangent import arctan2
 from ..base.easing import smoothstep
-from ..base.time_series import interpolate
 from ..base.errors import InputError, told_time
+from ..base.time_series import interpolate
 from ..library.automatic import automatic_words
 from ..library.keys import Key
 from ..library.library import Library
 from ..motion import quaternion
-from ..base.arctangent import arctan2
 from ..motion.motion import Motion
-from ..annotation.striking import BODY_PARTS
 from ..motion.track import BALL_RADIUS, SampledTrack, Track
+from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import travel_direction
-from ..synthesis.plan import Plan
-from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.construct.gaze import CHEST, following
-from ..synthesis.construct.on_track import STANDS, follow_turning
 from ..synthesis.construct.ball.strike import Touch
 from ..synthesis.construct.ball.strike_at import Meeting, Met, met_at
 from ..synthesis.construct.construction import Construction
-from ..synthesis.search.footage import Footage, fetch
+from ..synthesis.construct.gaze import CHEST, following
+from ..synthesis.construct.on_track import STANDS, follow_turning
 from ..synthesis.frame_sources import provenance_fields
+from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.search.footage import Footage, fetch
 from ..synthesis.search.path_costs import Alike
 from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.wanted import Wanted, WantedKey
 from ..synthesis.synthesize import look_of
-from ..motion.track.ball_path import BallPath
 from ..synthesis.take import Take
+from .alike import alike
+from .links import BoneWeights
+from .orders import HitOrder, Stance
+from .way import Placed, needed, placed, way
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""

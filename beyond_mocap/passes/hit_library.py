@@ -11,17 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
+from ..annotation.ball_contact import may_use_several, striking_part
+from ..annotation.striking import BODY_PARTS
+from ..ball.contact import Tool
 from ..base.digest import hex_digest
 from ..library.clip import Clip
 from ..library.library import Library
-from ..annotation.ball_contact import striking_part
-from ..annotation.ball_contact import may_use_several
-from ..annotation.striking import BODY_PARTS
 from . import kept
-from ..ball.contact import Tool
 from .hits import HitMotion, analyse, hit_at
 
 KINDS = ("toss", "pass", "attack")
@@ -207,10 +207,10 @@ def _stored(hits: tuple[LibraryHit, ...]) -> dict[str, np.ndarray]:
 def _restored(part: str, arrays: dict[str, np.ndarray]) -> tuple[LibraryHit, ...]:
     found = []
     for row in range(len(arrays["clip"])):
-        whole = {name: int(arrays[name][row]) for name in _WHOLE}
-        numbers = {name: float(arrays[name][row]) for name in _NUMBERS}
-        ways = {name: arrays[name][row] for name in ("vectors", "times", "velocity")}
+        read: dict[str, Any] = {name: int(arrays[name][row]) for name in _WHOLE}
+        read |= {name: float(arrays[name][row]) for name in _NUMBERS}
+        read |= {name: arrays[name][row] for name in ("vectors", "times", "velocity")}
         fasts = tuple(int(frame) for frame in arrays["fasts"][row])
-        hit = HitMotion(part=part, side=str(arrays["side"][row]), fasts=fasts, **whole, **numbers, **ways)
+        hit = HitMotion(part=part, side=str(arrays["side"][row]), fasts=fasts, **read)
         found.append(LibraryHit(int(arrays["clip"][row]), hit, bool(arrays["labelled"][row])))
     return tuple(found)

@@ -20,13 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ball.contact import Tool, striking_surface
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
-from ..ball.contact import Tool, striking_surface
 
 _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1
@@ -55,7 +55,7 @@ class HitMotion:
     first: int
     last: int
     high: int
-    fasts: tuple[int, int]
+    fasts: tuple[int, ...]
     key: int
     max_speed: float
     vectors: np.ndarray

@@ -13,20 +13,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .hit_library import kind_of
-from .hits import HitMotion
-from .orders import Stance
-from .pass_plan import PassPlan
-from .pass_scene import GROUND, Example, Pass, PassScene
 from ..base.easing import smoothstep
-from .bodies import BodySettings, least_seconds, player_motion
 from ..base.errors import InputError
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import heading
 from ..motion.motion import Motion
-from .passes import ball_of, ball_path, bone_weights, planned
 from ..motion.track.ball_path import BallPath
+from .bodies import BodySettings, least_seconds, player_motion
+from .hit_library import kind_of
+from .hits import HitMotion
+from .orders import Stance
+from .pass_plan import PassPlan
+from .pass_scene import GROUND, Example, Pass, PassScene
+from .passes import ball_of, ball_path, bone_weights, planned
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""

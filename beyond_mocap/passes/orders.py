@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 class Stance:
     """Where a player stands and which way he faces: place (2,) m on the ground of his root, facing rad from +x."""
 
-    place: tuple[float, float]
+    place: tuple[float, ...]
     facing: float
 
 
@@ -34,10 +34,10 @@ class HitOrder:
     clip: int
     hit: HitMotion
     strike_frame: float
-    place: tuple[float, float]
+    place: tuple[float, ...]
     facing: float
-    ball: tuple[float, float, float]
-    normal: tuple[float, float, float]
+    ball: tuple[float, ...]
+    normal: tuple[float, ...]
     part: str
     side: str
     tool: Tool | None = None

@@ -13,16 +13,27 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.vectors import unit_vectors
-from ..base.errors import InputError
-from ..motion import quaternion
-from ..base.arctangent import arctan2
 from ..ball.aim import aim
 from ..ball.batch import courses
 from ..ball.contact import in_world
+from ..base.arctangent import arctan2
+from ..base.errors import InputError
+from ..base.vectors import unit_vectors
+from ..motion import quaternion
 from .pass_costs import (
-    TIMES, TRUNK_TO, UPRIGHT, against_the_part, arrivals, cost_of_moments, lasting, misses, rising, spun, through_body,
-    ways_of, wished,
+    TIMES,
+    TRUNK_TO,
+    UPRIGHT,
+    against_the_part,
+    arrivals,
+    cost_of_moments,
+    lasting,
+    misses,
+    rising,
+    spun,
+    through_body,
+    ways_of,
+    wished,
 )  # fmt: skip
 from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
 from .pass_scene import GROUND, RECEIVE, Pass

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.vectors import cross_level
 from ..ball.batch import after, launched
-from .pass_scene import Net
 from ..ball.physics import Ball, rolling_spin
+from ..base.vectors import cross_level
+from .pass_scene import Net
 from .strike_moments import StrikeMoments
 
 TIMES = np.linspace(0.1, 2.5, 25)

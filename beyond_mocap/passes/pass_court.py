@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.errors import Cancelled
-from ..motion import quaternion
 from ..ball.aim import Aimed, aim
 from ..ball.contact import Tool, in_world
+from ..ball.physics import FASTEST, Ball
+from ..base.errors import Cancelled
+from ..motion import quaternion
 from .pass_costs import clears_net, out_of_the_way, spun, ways_of
 from .pass_scene import GROUND, Pass, PassScene, served_by
-from ..ball.physics import FASTEST, Ball
 from .strike_moments import StrikeMoments
 
 ON_TARGET = 0.02
@@ -154,7 +154,7 @@ class Court:
     def serving_seconds(self, place: np.ndarray) -> float:
         """How long the first ball flies to `place` (3,) m, on whole frames: a quiet throw, as high as a net needs."""
         start, fps = self.serving_place(place), self.scene.fps
-        quiet = SERVED_SECONDS + SERVED_PER_METRE * np.linalg.norm(place[:2] - start[:2])
+        quiet = SERVED_SECONDS + SERVED_PER_METRE * float(np.linalg.norm(place[:2] - start[:2]))
         tried = np.ceil(np.linspace(quiet, max(LONGEST_SERVE, quiet), 8) * fps) / fps
         starts = np.tile(start, (len(tried), 1))
         aimed = aim(starts, place, self.ball, tried, 0)

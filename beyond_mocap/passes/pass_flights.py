@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.vectors import unit_vectors
 from ..ball.aim import aim
 from ..ball.flight import Launch
+from ..base.vectors import unit_vectors
 from .pass_costs import arrivals, spun
 from .pass_court import LONGEST_SERVE, ON_TARGET, Court, Link, turned
 from .pass_scene import GROUND

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..ball.flight import Flight, Launch, fly
+from ..ball.physics import Ball
 from .orders import HitOrder, Stance
 from .pass_choice import choose
 from .pass_costs import THROUGH, ways_of
 from .pass_court import ON_TARGET, Court, Link, Natural, Site
 from .pass_flights import Flown, fitted, laid
 from .pass_scene import GROUND, PassScene
-from ..ball.physics import Ball
 
 LIMP = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
 """m/s ahead and up with which a ball goes that was stopped, or that slipped off."""

@@ -1,5 +1,5 @@
-"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form as a
-file)."""
+"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form
+as a file)."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
+from typing import Any
 
-from ..base.settings import defaults, setting
-from ..base.errors import InputError
 from ..ball.contact import Tool
+from ..base.errors import InputError
+from ..base.settings import defaults, setting
 from .hits import HitMotion
 
 KINDS = ("toss", "pass", "attack")
@@ -43,7 +44,7 @@ LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
 FAR = 100.0
 """Metres between two players, above which nobody passes."""
 
-Place = tuple[float, float]
+Place = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ class BallChoice:
     """A ball: one of the known kinds, with other numbers where `changes` says so (`physics.Ball`'s own names)."""
 
     kind: str = "paper"
-    changes: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    changes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self):
         object.__setattr__(self, "changes", MappingProxyType(dict(self.changes)))

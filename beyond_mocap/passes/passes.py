@@ -1,17 +1,28 @@
 """The recipe of a passing scene: several players keep a ball going (Ball handling).
 
-`passes.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each player;
-the ball's path is the flights, one after the other.
+`passes.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each
+player; the ball's path is the flights, one after the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
 from ..ball.contact import Tool
+from ..ball.physics import BALLS, Ball
+from ..base.errors import Cancelled, InputError, NotInLibrary
+from ..base.settings import setting
+from ..library.library import Library
+from ..motion.humanoid import stature
+from ..motion.quaternion import multiply
+from ..motion.track.ball_path import BallPath
+from ..synthesis.own_size import in_own_size
+from ..synthesis.take import Take
+from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .hit_library import MatchWeights
 from .hits import HitMotion, strongest
 from .links import BoneWeights
@@ -19,23 +30,13 @@ from .orders import HitOrder, Stance
 from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
-from ..ball.physics import BALLS, Ball
 from .strike_choice import Choice, unsaid
 from .strike_moments import StrikeMoments, strike_moments
-from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
-from ..base.settings import setting
-from ..base.errors import Cancelled, InputError, NotInLibrary
-from ..library.library import Library
-from ..motion.humanoid import stature
-from ..motion.quaternion import multiply
-from ..synthesis.own_size import in_own_size
-from ..motion.track.ball_path import BallPath
-from ..synthesis.take import Take
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
 
-BALL_LIMITS = {
+BALL_LIMITS: dict[str, Any] = {
     **{name: (setting("passes", name).least, setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
     "mass": (0.001, 20.0), "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "friction": (0.0, 5.0),
@@ -196,7 +197,7 @@ def _with_chance(scene: PassScene) -> PassScene:
         if draw < scene.missed + scene.dropped:
             order[number] = replace(one, error="missed" if draw < scene.missed else "dropped")
             break
-    return replace(scene, passes=order[: number + 1], repeat=1)
+    return replace(scene, passes=tuple(order[: number + 1]), repeat=1)
 
 
 def _sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
@@ -312,7 +313,7 @@ def _played(
     return replace(moved, take=replace(grown, ball=path), gaps=moved.gaps * size, moved=moved.moved * size)
 
 
-def _sized(order: HitOrder | Stance, size: float) -> HitOrder | Stance:
+def _sized(order, size: float):
     """What a player `size` times as large as the library has to do, in the library's size."""
     if size == 1.0:
         return order

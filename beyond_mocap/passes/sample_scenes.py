@@ -1,5 +1,5 @@
-"""Passing scenes to begin with, in the form of SCENE.json (docs/passes/passes.md): three and six players as in Fig. 7 and 8,
-foot volleyball over a net, a rally with racquets, and a ball that is dropped."""
+"""Passing scenes to begin with, in the form of SCENE.json (docs/passes/passes.md): three and six players as in Fig. 7
+and 8, foot volleyball over a net, a rally with racquets, and a ball that is dropped."""
 
 from __future__ import annotations
 

@@ -7,12 +7,13 @@ import math
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
+from typing import Any
 
 from ..ball.contact import Tool
-from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
+from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
 """Bytes of a file above which it is no scene."""
@@ -90,7 +91,7 @@ def _pass_out(one: Pass) -> dict:
 
 
 def _scene(whole) -> PassScene:
-    read = {
+    read: dict[str, Callable] = {
         "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
         "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number,
         "directions": whole_number,
@@ -105,7 +106,7 @@ def _scene(whole) -> PassScene:
 
 
 def _player(value, where: str) -> Player:
-    read = {
+    read: dict[str, Callable] = {
         "name": text, "place": _place, "facing": _angle, "part": text, "side": text, "tool": _tool,
         "height": number,
     }  # fmt: skip
@@ -133,12 +134,12 @@ def _settings(value, where: str) -> dict:
 def _example(value, where: str) -> Example:
     check_names(value, where, ("clip", "from", "to"), ("clip",))
     names = {"from": "start", "to": "end"}
-    found = {names[old]: number(value[old], f"{where}: {old}") for old in names if old in value}
+    found: dict[str, Any] = {names[old]: number(value[old], f"{where}: {old}") for old in names if old in value}
     return Example(text(value["clip"], f"{where}: clip").replace("\\", "/"), **found)
 
 
 def _tool(value, where: str) -> Tool:
-    read = {"name": text, "length": number, "radius": number, "reach": number}
+    read: dict[str, Callable] = {"name": text, "length": number, "radius": number, "reach": number}
     check_names(value, where, read, ())
     found = {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
     try:
@@ -161,15 +162,15 @@ def _ball_number(value, where: str):
 
 def _net(value, where: str) -> Net:
     check_names(value, where, ("from", "to", "height"), ("from", "to", "height"))
-    ends = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
-    return Net(*ends, number(value["height"], f"{where}: height"))
+    start, end = (_place(value[name], f"{where}: {name}") for name in ("from", "to"))
+    return Net(start, end, number(value["height"], f"{where}: height"))
 
 
 def _serve(value, where: str):
     return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
 
 
-def _errors(value, where: str) -> dict[str, float]:
+def _errors(value, where: str) -> dict[str, Any]:
     check_names(value, where, ("missed", "dropped"), ())
     return {name: number(one, f"{where}: {name}") for name, one in value.items()}
 
@@ -179,8 +180,8 @@ def _weights(value, where: str) -> Weights:
     check_names(value, where, names, ())
     bones = value.get("bones", {})
     check_object(bones, f"{where}: bones")
-    found = Weights(**{name: number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"})
-    return replace(found, bones={name: number(one, f"{where}: {name}") for name, one in bones.items()})
+    said: dict[str, Any] = {name: number(one, f"{where}: {name}") for name, one in value.items() if name != "bones"}
+    return replace(Weights(**said), bones={name: number(one, f"{where}: {name}") for name, one in bones.items()})
 
 
 def _list_of(read: Callable) -> Callable:

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from ..annotation.ball_contact import striking_part
 from ..annotation.labels import list_labels
-from ..library.library import Library
 from ..ball.contact import Tool, striking_surface
+from ..ball.physics import FASTEST
+from ..library.library import Library
 from .hit_library import HitLibrary, LibraryHit
 from .orders import HitOrder
 from .pass_scene import RECEIVE
-from ..ball.physics import FASTEST
 
 TOOL_WORDS = frozenset(list_labels(part="tool"))
 RECEIVE_WORDS = frozenset(list_labels(ball="takes"))

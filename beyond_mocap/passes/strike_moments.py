@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..ball.contact import StruckFrom, Tool, ball_centre, in_world, striking_surface, struck_from
 from ..base.vectors import unit_vectors
 from ..library.library import Library
 from ..motion import quaternion
-from ..ball.contact import StruckFrom, Tool, ball_centre, in_world, struck_from, striking_surface
 from .hit_library import LibraryHit
 
 MOST_FRAMES = 7
@@ -40,7 +40,7 @@ class StrikeMoments:
     def __len__(self) -> int:
         return len(self.which)
 
-    def only(self, which: np.ndarray) -> StrikeMoments:
+    def only(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
         """Those of a mask or of indices (M,)."""
         struck = self.struck
         return replace(

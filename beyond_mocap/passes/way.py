@@ -197,8 +197,8 @@ def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
     out = np.empty((len(times), 2))
     for number in range(4):
         inside = (times >= edges[number]) & (times <= edges[number + 1])
-        ends = [(edges[n], states[n], speeds[n]) for n in (number, number + 1)]
-        out[inside] = quintic_between(times[inside], *ends)
+        begin, finish = ((edges[n], states[n], speeds[n]) for n in (number, number + 1))
+        out[inside] = quintic_between(times[inside], begin, finish)
     return out
 
 

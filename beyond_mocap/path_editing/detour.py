@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..motion.path.arc_length import ArcLength
-from ..base.arctangent import arctan2
 from ..motion.path.path import Path, SplinePath
 
 RISE = 0.4
@@ -31,7 +31,7 @@ def offsets(arc: np.ndarray, detours) -> np.ndarray:
 
 def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
     """`offsets` on a closed path of this length: a detour goes on across the place where the path closes."""
-    return sum(offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0))
+    return sum((offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0)), np.zeros(()))
 
 
 def gentle_width(offset, speed: float):

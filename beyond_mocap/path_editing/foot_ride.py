@@ -15,15 +15,26 @@ import numpy as np
 
 from ..base.vectors import unit_vector
 from ..motion import quaternion
+from ..motion.foot_plant import (
+    MOST_DROP,
+    Foot,
+    Planted,
+    heel_rise,
+    held_less,
+    held_shift,
+    lacking,
+    laid_foot,
+    lift_to_ground,
+    pelvis_drop,
+    settled,
+    spread_over,
+    turned_flat,
+)
 from ..motion.humanoid import Limb, identify
 from ..motion.motion import pose_kinematics
+from ..motion.reach import CLEAR_BEND, bent_limb
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
-from ..motion.foot_plant import (
-    MOST_DROP, Foot, Planted, heel_rise, held_less, held_shift, lacking, lift_to_ground, laid_foot, pelvis_drop,
-    settled, spread_over, turned_flat,
-)
-from ..motion.reach import CLEAR_BEND, bent_limb
 from .ground_contact import Surface, footing
 
 MOST_SHIFT = 0.45
@@ -133,7 +144,7 @@ def follow(
 
 
 @lru_cache(maxsize=32)
-def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, Limb]]:
+def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
     """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the
     part."""
     body = identify(skeleton)
@@ -172,7 +183,8 @@ def _on_own_ground(
     above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
     lifts = [lift_to_ground(foot, sole, scale) for foot in above]
     weights = [foot.carries for foot in feet]
-    off = settled(sum(w * lift for w, lift in zip(weights, lifts)), sum(weights), scale, _FLOOR)
+    lifted = sum((w * lift for w, lift in zip(weights, lifts)), np.zeros(()))
+    off = settled(lifted, sum(weights, np.zeros(())), scale, _FLOOR)
     if np.abs(off).max(initial=0.0) > _EVEN:
         lifts = [off + lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
     return [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off

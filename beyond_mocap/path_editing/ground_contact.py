@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step_by_powers
+from ..base.runs import runs
 from ..base.time_series import interpolate
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
-from ..base.runs import runs
 from ..motion.path.terrain import Terrain
 
 STEEPEST = 0.7

@@ -107,7 +107,7 @@ class _Stretches:
         """First and last frame from the jump on of which both stretches have a recording."""
         return -min(self.loop.start, -int(self.around[0])), min(self.count - 1 - self.loop.end, int(self.around[-1]))
 
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+    def _places(self) -> tuple[np.ndarray, ...]:
         """Frames (R,) of the ending and of the beginning stretch, held at the motion's own ends."""
         return tuple(np.clip(at + self.around, 0, self.count - 1) for at in (self.loop.end, self.loop.start))
 

@@ -271,4 +271,4 @@ def _soles_apart(
 def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
     """Sums of a square array over 2 * window + 1 places along its diagonals, where they lie inside."""
     size = len(values) - 2 * window
-    return sum(values[k : k + size, k : k + size] for k in range(2 * window + 1))
+    return sum((values[k : k + size, k : k + size] for k in range(2 * window + 1)), np.zeros(()))

@@ -6,12 +6,12 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
+from ..base.arctangent import arctan2
+from ..base.errors import TimedLine
+from ..base.runs import runs
 from ..base.time_series import hann_smooth
 from ..base.vectors import cross_level
-from ..base.errors import TimedLine
-from ..base.arctangent import arctan2
 from ..motion.path.path import Path
-from ..base.runs import runs
 
 TIGHT = 0.3
 """Metres of radius, about a foot's length, below which a bend is too tight to walk on."""

@@ -6,12 +6,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.errors import InputError
+from ..base.runs import runs
 from ..base.time_series import interpolate
 from ..base.vectors import distance_along, unit_vectors
-from ..base.errors import InputError
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
-from ..base.runs import runs
 from ..motion.path.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
@@ -180,7 +180,7 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
     return out
 
 
-def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, np.ndarray]:
+def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
     """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
 
     period: samples in a round, for closed lines.

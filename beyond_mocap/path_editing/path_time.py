@@ -26,7 +26,6 @@ from ..motion.path.path import Path
 from ..motion.track import zero_phase_hann
 from .path_frame import Residuals
 
-
 SHORTER = 0.4
 """By how much steps are shorter on slopes: this times the slope, as a share."""
 

@@ -11,32 +11,43 @@ from functools import cached_property
 
 import numpy as np
 
-from ..base.settings import defaults, setting
 from ..base.errors import InputError, TimedLine
+from ..base.runs import runs
+from ..base.settings import defaults, setting
 from ..motion import contacts, quaternion
-from ..motion.path.arc_length import ArcLength
+from ..motion.foot_plant import Planted
 from ..motion.humanoid import heading as facing
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
+from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
-from ..base.runs import runs
 from ..motion.path.terrain import Terrain
 from ..motion.track import zero_phase_hann
 from ..synthesis.construct.banking import banked, bent_forward, missing_lean
 from .cycle import cycled
 from .detour import with_detours
-from ..motion.foot_plant import Planted
 from .foot_ride import LONGEST, Ground, Steps, follow
+from .ground_contact import footing, is_level, mesh_surface, path_surface
 from .loops import Loop, find_loops
+from .path_curvature import curvature, share, steep, tight
+from .path_curvature import told as tight_told
 from .path_end import Ending, ending
 from .path_fit import KINDS, fit, fit_polynomial, fit_spline
 from .path_frame import MovingFrame, Residuals, check_frame, moving_frame, placed, relative
-from .path_curvature import curvature, share, steep, tight
-from .path_curvature import told as tight_told
 from .path_time import (
-    Timing, Way, Wishes, asked_length, by_arc_length, by_time, by_way, parameter_at, shown, stretched, way_at, way_of,
+    Timing,
+    Way,
+    Wishes,
+    asked_length,
+    by_arc_length,
+    by_time,
+    by_way,
+    parameter_at,
+    shown,
+    stretched,
+    way_at,
+    way_of,
 )
-from .ground_contact import footing, is_level, mesh_surface, path_surface
 
 _DEFAULTS = defaults("path_editing")
 ENDS = setting("path_editing", "end").choice_names
@@ -205,7 +216,8 @@ def prepare(
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
     """The motion of `source` on `path`.
 
-    ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across it.
+    ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across
+    it.
     The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the
     path has no length.
     """

@@ -25,7 +25,7 @@ class Answers:
 
     background: Mapping[str, Mapping[str, str]]
     ratings: Mapping[str, Mapping[str, int]]
-    choices: Mapping[str, Mapping[tuple[str, str], str]]
+    choices: Mapping[str, Mapping[tuple[str, ...], str]]
     missing: int
 
     @property
@@ -95,7 +95,7 @@ def answer_files(paths: Sequence[Path]) -> list[Path]:
     return out
 
 
-def _rows(path: Path) -> Iterable[tuple[str, str, str, str, str]]:
+def _rows(path: Path) -> Iterable[tuple[str, ...]]:
     """(place, study, rater, question, answer) of one file."""
     if path.suffix.lower() != ".json":
         for place, row in read_rows(path, ANSWER_COLUMNS, separators=",;\t"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .questions import SCALE
 
 COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
 _WIDTH, _DPI = 11.0, 100
-_NAME = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
+_NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
 
 
 def rows_of(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,15 @@ from collections import Counter
 
 from ..evaluation import plots
 from ..evaluation.html_page import (
-    Html, build_image, build_number_cell, build_page, build_row, build_section, build_table, build_title, element,
+    Html,
+    build_image,
+    build_number_cell,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    build_title,
+    element,
     fragment,
 )
 from ..evaluation.report import rounded

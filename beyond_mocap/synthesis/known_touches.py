@@ -20,10 +20,10 @@ from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedLine
 from ..motion.track import BALL_RADIUS
-from .plan import Plan, SolvedCourse, Touched
 from .construct.ball.dribble import dribble
 from .construct.ball.meeting import led, lofted
 from .construct.ball.strike import held_frames
+from .plan import Plan, SolvedCourse, Touched
 from .resolved_plan import ResolvedPlan
 from .take import DribbleTouch, KeyResult, Take
 
@@ -150,7 +150,7 @@ def untouched(take: Take, plan: ResolvedPlan) -> list[str]:
     if plan.course is None:
         told = "the touches of the ball are not solved: the track has no ball, or too few samples of it"
         return [told] if plan.asked.solve_touches else []
-    missing = [
+    missing: list[str] = [
         TimedLine(
             f"{key.time:g} s: the ball's course tells of no touch for '{' '.join(key.words)}' within {FURTHEST:g} s, "
             "it stays where it is asked for", (key.time, key.time),

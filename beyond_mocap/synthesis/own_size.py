@@ -13,8 +13,8 @@ import numpy as np
 
 from ..motion.motion import Motion
 from ..motion.track import BALL_RADIUS
-from .plan import Plan
 from ..motion.track.ball_path import BallPath
+from .plan import Plan
 from .take import Take
 
 _EVEN = 1e-9

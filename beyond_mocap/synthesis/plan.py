@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..annotation import Timeline
+from ..base.errors import InputError, told_time
 from ..base.settings import defaults, rows_of, setting
 from ..base.settings.setting import check_limits
-from ..base.errors import InputError, told_time
 from ..motion.skeleton import frozen_array
 from ..motion.track import SampledTrack, Track, sample
 
@@ -97,9 +97,11 @@ class Plan:
     clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
     solved: the ball's course where it is known already, such as from a whole match.
 
-    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.balance`), delta §3.2.4, omega and gaits
+    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.balance`), delta §3.2.4, omega and
+    gaits
     §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`, track_window
-    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error is always measured
+    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error is always
+    measured
     with a root_window of 1.5.
 
     InputError for a number outside the limits of its setting, and for two pins of one part at one time.

@@ -11,10 +11,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from .known_touches import solve_touches
 from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.track import Track
+from .known_touches import solve_touches
 from .plan import Plan, SolvedCourse
 from .resolved_plan import ResolvedPlan
 

@@ -5,10 +5,10 @@
     take = resynthesize(library, plan, take)
 
 What counts as touched is said in `synthesis.search.touched`. Touched stretches are searched between frames that stay
-(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed over to
-the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only where the body turns a
-full turn more or less than before, the quaternions behind may have the other sign, since a motion's signs are
-continuous.
+(`synthesis.search.path_search`, `Between`), laid on the ground with the facing given at both ends, planted, and handed
+over to the old motion on both sides (`synthesis.construct.hand_over`). All other frames come back bit for bit; only
+where the body turns a full turn more or less than before, the quaternions behind may have the other sign, since a
+motion's signs are continuous.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -23,27 +24,27 @@ from ..base.errors import InputError, told_time
 from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
-from .own_size import taken_in_library_size
-from .plan import Plan
-from .construct.hand_over import handed_over, old_share
-from .construct.smoothing import reaches
-from .resolve_plan import resolve_plan
-from .search.balance import balanced
+from ..motion.track.ball_path import BallPath
 from .construct.construction import Construction
+from .construct.hand_over import handed_over, old_share
 from .construct.key_moments import find_touches, key_results
 from .construct.old_motion import OldMotion
+from .construct.smoothing import reaches
+from .frame_sources import sources_shown, words_shown
+from .own_size import taken_in_library_size
+from .plan import Plan
+from .resolve_plan import resolve_plan
+from .resolved_plan import ResolvedPlan
+from .search.balance import balanced
 from .search.edit_list import EditList
 from .search.footage import Shown, fetch, output_index, shown
-from .frame_sources import sources_shown, words_shown
 from .search.offer import SLOT
 from .search.path_search import Between, PathSearch
-from .resolved_plan import ResolvedPlan
-from .search_library import search_library
 from .search.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
 from .search.used import Used, used_in
 from .search.wanted import Wanted, build_order
+from .search_library import search_library
 from .synthesize import Progress, finished, synthesize
-from ..motion.track.ball_path import BallPath
 from .take import KeyResult, Take
 
 HAND_OVER = 0.5
@@ -85,7 +86,7 @@ def resynthesize(
     report = progress or (lambda fraction, text: None)
     if anew is not None:
         _check(plan, before, anew)
-    asking = {"cancelled": cancelled, "hurry": hurry}
+    asking: dict[str, Any] = {"cancelled": cancelled, "hurry": hurry}
     with threadpool_limits(limits=1):
         comparable = _comparable(plan, before)
         taken = _edited(library, plan, before, report, **asking, anew=anew) if comparable else None

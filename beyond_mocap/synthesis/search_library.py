@@ -10,8 +10,8 @@ from ..annotation.ball_contact import takes_with_foot
 from ..library.chosen import with_chosen_gaits
 from ..library.library import Library
 from ..motion.track import sample
-from .search.edit_list import EditList
 from .resolved_plan import ResolvedPlan
+from .search.edit_list import EditList
 
 
 def search_library(

@@ -4,9 +4,10 @@
     track, report = clean(read_track_csv("player.csv"))
     take = synthesize(library, Plan(track=track, timeline=read_timeline("player.txt", 30.0)))
 
-The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`, or
-`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and laid on the track
-(`synthesis.construct`).
+The plan is put into frames (`synthesis.search.wanted`), a search picks what is shown (`synthesis.search.path_search`,
+or
+`synthesis.search.blocks` with `synthesis.search.locomotion`), the frames are fetched (`synthesis.search.footage`) and
+laid on the track (`synthesis.construct`).
 """
 
 from __future__ import annotations
@@ -20,35 +21,35 @@ import numpy as np
 
 from ..annotation import LOCOMOTION_WORDS, avoided_per_frame
 from ..base.errors import InputError, TimedLine, told_time
-from .quality.give_way import give_way
-from .quality.played import played_from_take
-from .known_touches import untouched, with_course
-from ..library.library import Library
-from ..motion.motion import Motion, at_frames
 from ..base.runs import runs
-from .own_size import in_own_size
-from .plan import METHODS, Plan
+from ..library.library import Library
 from ..motion.foot_plant import Planted
-from .construct.pins import look_axis, pinned
-from .construct.steps import Steps
-from .resolve_plan import resolve_plan
-from .search.balance import balanced
-from .search.blocks import BlockSearch
+from ..motion.motion import Motion, at_frames
+from ..motion.track.ball_path import BallPath
 from .construct.construction import Construction
 from .construct.key_moments import find_touches, key_results
+from .construct.pins import look_axis, pinned
+from .construct.steps import Steps
 from .construct.thesis_methods import lay_out_blocks
+from .frame_sources import provenance_fields
+from .known_touches import untouched, with_course
+from .own_size import in_own_size
+from .plan import METHODS, Plan
+from .quality.give_way import give_way
+from .quality.played import played_from_take
+from .resolve_plan import resolve_plan
+from .resolved_plan import ResolvedPlan
+from .search.balance import balanced
+from .search.blocks import BlockSearch
 from .search.distance import exact_keys, straight_edit, warped_edit
 from .search.dragged import left_out
 from .search.edit_list import EditList
 from .search.footage import fetch, output_index
-from .frame_sources import provenance_fields
 from .search.locomotion import match_distance
 from .search.path_search import PathSearch
-from .resolved_plan import ResolvedPlan
-from .search_library import search_library
 from .search.used import Used
 from .search.wanted import Wanted, build_order
-from ..motion.track.ball_path import BallPath
+from .search_library import search_library
 from .take import PinResult, Take
 
 NEAR_KEY = 1.5
@@ -258,7 +259,7 @@ def _crowded_out(order: Wanted, edit: EditList) -> list[str]:
     ]
 
 
-def _shown_all_the_same(take: Take) -> list[str]:
+def _shown_all_the_same(take: Take) -> list[TimedLine]:
     """One warning per stretch and word that must not be, where no way without it was found; what key moments close by
     ask for is not told."""
     times = take.start_time + np.arange(len(take.words)) / take.motion.fps
@@ -293,7 +294,7 @@ def _pins_missed(take: Take) -> list[str]:
     return told
 
 
-def _gave_way(library: Library, plan: Plan, take: Take) -> list[str]:
+def _gave_way(library: Library, plan: Plan, take: Take) -> list[TimedLine]:
     """What could not all hold, and when."""
     played = played_from_take(take)
     return give_way(

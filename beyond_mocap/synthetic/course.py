@@ -11,11 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step
-from ..base.time_series import hann_smooth
 from ..base.errors import InputError
+from ..base.time_series import hann_smooth
+from ..motion.retargeting.neutral import Neutral
 from . import gait_tables as tables
 from .gait_tables import at_speed
-from ..motion.retargeting.neutral import Neutral
 
 # the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
 # all the time, from this speed on, metres per second
@@ -113,7 +113,7 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
 def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
     """A slow aimless wave (N,) of about unit size: four sines around `period` seconds with seeded phases."""
     random = np.random.default_rng(seed)
-    rates, phases = (0.6, 0.9, 1.35, 1.9) / np.float64(period), random.uniform(0.0, 2.0 * np.pi, 4)
+    rates, phases = np.array([0.6, 0.9, 1.35, 1.9]) / period, random.uniform(0.0, 2.0 * np.pi, 4)
     return np.sin(2.0 * np.pi * rates * times[:, None] + phases) @ np.array([0.5, 0.45, 0.35, 0.25])
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from ..base.easing import quintic_step
 from ..base.time_series import interpolate
-from . import gait_tables as tables
 from ..motion.retargeting.neutral import Neutral
+from . import gait_tables as tables
 
 # beyond this pitch the ball of the foot leaves the ground and the toe tip stays
 _TOE_LIFTS = np.radians(42.0)

@@ -16,17 +16,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.time_series import hann_smooth, interpolate
-from . import gait_tables as tables
+from ..motion.humanoid import identify
+from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, travel
 from .gait_tables import at_speed
 from .gait_trunk import arms, trunk
-from ..motion.humanoid import identify
-from ..motion.motion import Motion
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
-from ..motion.skeleton import Skeleton
 
 # how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
 _AHEAD, _BEHIND = 0.41, 0.72
@@ -137,7 +137,7 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
 
 
 def posture_over(
-    course: Course, steps: tuple[Footsteps, Footsteps], neutral: Neutral, style: GaitStyle, seed: int
+    course: Course, steps: tuple[Footsteps, ...], neutral: Neutral, style: GaitStyle, seed: int
 ) -> Posture:
     """The posture at all moments of `course` for feet that stand as `steps` says (left, right)."""
     above = trunk(course, neutral, style, seed)
@@ -157,7 +157,7 @@ def posture_over(
     return with_feet(posture, course.times, steps, neutral)
 
 
-def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, Footsteps], neutral: Neutral) -> Posture:
+def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: Neutral) -> Posture:
     """The posture with feet that stand as `steps` says (left, right), hips lowered where a leg would not reach. times
     (T,).
     """

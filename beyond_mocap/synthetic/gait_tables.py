@@ -33,7 +33,7 @@ FASTEST = 9.5  # m/s, the tables' last speed
 # walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)
 _CHANGE = (1.95, 2.35)
 
-_SPEEDS = {
+_SPEEDS: dict[str, list[tuple[float, float]]] = {
     # strides per second: G below 2 (cadence grows as the root of speed), N and D above
     "frequency": [
         (0, 0.55),
@@ -141,7 +141,7 @@ def _curve(name: str) -> PchipInterpolator:
     return PchipInterpolator(x, y, extrapolate=False)
 
 
-def at_speed(name: str, speed: np.ndarray) -> np.ndarray:
+def at_speed(name: str, speed: float | np.ndarray) -> np.ndarray:
     """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table
     says.
     """

@@ -8,10 +8,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.easing import quintic_step
+from ..motion.retargeting.neutral import Neutral
 from . import gait_tables as tables
 from .course import Course, GaitStyle, wander
 from .gait_tables import at_speed, run_share
-from ..motion.retargeting.neutral import Neutral
 
 
 def trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:

@@ -15,17 +15,17 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..base.easing import quintic_step
-from . import gait_tables as tables
 from ..motion import quaternion
+from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, lift_off_ground
 from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
 from .keyed import envelope, keyed, mixed
-from ..motion.motion import Motion
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
-from ..motion.skeleton import Skeleton
 
 LEFT, RIGHT = 0, 1
 

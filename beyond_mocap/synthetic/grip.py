@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import InputError
-from . import gait_tables as tables
 from ..motion import quaternion
 from ..motion.humanoid import identify
 from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 
 _AHEAD, _DOWN = 0.012, 0.105  # metres of an adult whose hand hangs: thumb's side, towards the fingertips
 USUAL = 0.036

@@ -10,7 +10,6 @@ from scipy.interpolate import PchipInterpolator
 from ..base.easing import quintic_step
 
 
-
 def keyed(rows, times: np.ndarray) -> np.ndarray:
     """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the
     last."""

@@ -15,16 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step
-from . import gait_tables as tables
 from ..motion import quaternion
-from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
 from ..motion.humanoid import identify
-from .keyed import keyed_rounded
 from ..motion.mirror import mirror
 from ..motion.motion import Motion, at_frames, place, pose_kinematics
 from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from . import gait_tables as tables
+from .footsteps import lift_off_ground
+from .gestures import LEFT, RIGHT
+from .keyed import keyed_rounded
 
 BEFORE, AFTER = 1.5, 1.3
 """Seconds of a hard kick before and after the contact; slower ones take longer."""
@@ -49,7 +49,7 @@ class KickStyle:
     """
 
     approach: float
-    strides: tuple[float, float, float]
+    strides: tuple[float, ...]
     leg: tuple
     plane: tuple
     foot: tuple
@@ -157,7 +157,7 @@ def kicked(
 
 
 def contact(
-    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]]
+    style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same,
     in N ways of (lift, loft)."""

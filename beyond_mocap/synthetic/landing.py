@@ -16,13 +16,13 @@ import numpy as np
 from ..base.easing import quintic_step
 from ..base.vectors import cross, unit_vectors
 from ..motion import quaternion
-from .gait_tables import GRAVITY
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, at_frames, concatenate, pose_kinematics, resample
 from ..motion.retargeting.neutral import neutral_stance
-from .resting import arms_above_ground, lowest_root, on_the_side, widened
 from ..motion.skeleton import Skeleton
 from ..motion.spring import Offset
+from .gait_tables import GRAVITY
+from .resting import arms_above_ground, lowest_root, on_the_side, widened
 
 IN_THE_AIR = 0.25
 """Metres between the lowest part of the body and the ground, above which a recording's end is a flight."""

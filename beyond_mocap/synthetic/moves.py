@@ -9,17 +9,17 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from ..base.easing import quintic_step
-from . import gait_tables as tables
+from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import to_motion
+from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps
 from .gait import footsteps, posture_over, with_feet
 from .gestures import LEFT, RIGHT, Gesture
 from .keyed import envelope, keyed, mixed
-from ..motion.motion import Motion
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import to_motion
-from ..motion.skeleton import Skeleton
 
 # rows: seconds from the touch, then (hips up, ahead), (list, tilt, turn), spine, arms (flexion, abduction, inward,
 # elbow)

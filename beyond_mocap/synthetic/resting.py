@@ -9,7 +9,6 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..base.vectors import unit_vectors
-from . import gait_tables as tables
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import pose_kinematics
@@ -17,6 +16,7 @@ from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
+from . import gait_tables as tables
 
 THICKNESS = {
     "hips": 0.09, "chest": 0.09, "neck": 0.06, "head": 0.07, "shoulder": 0.06, "upper_arm": 0.06, "lower_arm": 0.04,

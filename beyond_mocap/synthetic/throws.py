@@ -14,19 +14,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
-from . import gait_tables as tables
 from ..motion import quaternion
-from ..motion.retargeting.adult import adult_skeleton
-from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
-from .grip import grip_in
 from ..motion.humanoid import identify
-from .keyed import keyed_rounded
 from ..motion.mirror import mirror
 from ..motion.motion import Motion, at_frames, forward_kinematics, place
+from ..motion.retargeting.adult import adult_skeleton
 from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
+from .footsteps import lift_off_ground
+from .gestures import LEFT, RIGHT
+from .grip import grip_in
+from .keyed import keyed_rounded
 
 GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2

@@ -11,18 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from . import gait_tables as tables
+from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.retargeting.posture import Posture, hip_joints, to_motion
+from ..motion.skeleton import Skeleton
+from . import gait_tables as tables
 from .course import Course
 from .footsteps import Footsteps, lift_off_ground
 from .gait import thigh_shank, with_feet
 from .gestures import LEFT, RIGHT, Gesture
 from .keyed import envelope, keyed, mixed
-from ..motion.motion import Motion
 from .moves import standing_posture, walked_steps
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.retargeting.posture import Posture, hip_joints, to_motion
-from ..motion.skeleton import Skeleton
 
 BEFORE, AFTER = 1.6, 1.9
 """Seconds of the clip before and after the touch."""
@@ -363,7 +363,7 @@ def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Co
     return course, posture.changed(hips=hips, pelvis=posture.pelvis + lean, spine=spine, head=head)
 
 
-def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, Footsteps]:
+def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, ...]:
     """Both feet on the ground all the time."""
     return tuple(walked_steps(course, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
 

@@ -15,12 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..ball import batch
+from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.motion import Motion, forward_kinematics, place
-from ..ball import batch
-from ..ball.physics import Ball
 from .led_limb import Hold, LedLimb, at_once
 from .letting_go import AtFoot, InHand, carried, grip_point
 from .shift import shifts_about
@@ -161,7 +161,7 @@ class _Search:
         now = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
         found = []
         for _ in range(_LOOKS if isinstance(self.part, AtFoot) else 2):
-            now = self._looked(*now, start)
+            now = self._looked(now[0], now[1], start)
             found.append((self._left_over(*now, start), len(found), now))
         return [each for _, _, each in sorted(found, key=lambda one: one[:2])]
 
@@ -322,10 +322,9 @@ class _Search:
         rest = start + (0.0 * away if self.walks else now.rest + away)
         if self.walks:
             spread[0] = spread[0] - away[:, None]
-        there, gap, speed = self._arrives(
-            *(value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows)), nudge[:, 6],
-            nudge[:, 7] / (1.0 + now.pace), rest, now.seconds + nudge[:, -1],
-        )  # fmt: skip
+        places, speeds = (value + np.tensordot(nudge[:, :6], part, 1) for value, part in zip(spread, follows))
+        pace, seconds = nudge[:, 7] / (1.0 + now.pace), now.seconds + nudge[:, -1]
+        there, gap, speed = self._arrives(places, speeds, nudge[:, 6], pace=pace, rest=rest, seconds=seconds)
         missing = np.concatenate([there - self.target, gap], axis=1).reshape(count, each, -1)
         speed = speed.reshape(count, each)
         slopes = np.swapaxes(missing[:, 1:] - missing[:, :1], 1, 2) / _STEP

@@ -12,17 +12,14 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..motion.hand import hand_of
-from ..motion.hand import usual_centre
 from ..base.errors import Cancelled, InputError
-from ..synthesis.quality.jerk import jerk
 from ..evaluation.paired_tests import kept
-from .report.deviation import deviations, lost_ones
-from .report.impact import WALL, impact, let_go
 from ..files.tables import plain
 from ..motion import quaternion
+from ..motion.hand import hand_of, usual_centre
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
+from ..synthesis.quality.jerk import jerk
 from .networks.chains import EFFECTORS, chains_of
 from .networks.description import scaled
 from .networks.example import Example, describe
@@ -30,6 +27,8 @@ from .networks.generate import Generated, Options, generate
 from .networks.kinematics import matrices
 from .networks.limits import JointLimits
 from .networks.model import ThrowModel
+from .report.deviation import deviations, lost_ones
+from .report.impact import WALL, impact, let_go
 
 RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 """As tables 8.1 to 8.4 were measured: what networks say is fed back, nothing corrects it."""
@@ -182,7 +181,8 @@ def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, 
     grip = usual_centre(hand.finger, hand.reach)
     mine, its = (chains_of(of.skeleton).effectors[example.limb] for of in (motion, example.motion))
     came = let_go(motion, mine, grip, example.release, shift[:, example.limb])
-    wanted = tuple(ratio * part for part in let_go(example.motion, its, grip / ratio, example.release))
+    place, speed = let_go(example.motion, its, grip / ratio, example.release)
+    wanted = ratio * place, ratio * speed
     near, far = np.array([WALL, 0.0, target[2]]), np.asarray(target)
     off = [np.linalg.norm(impact(*came, there) - impact(*wanted, there)) for there in (near, far)]
     return float(off[0]), float(off[1]), float(np.linalg.norm(impact(*wanted, far) - far))

@@ -15,18 +15,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import InputError, TimedLine
-from ..synthesis.quality.jerk import jerk, uncut_windows, windowed
 from ..library.library import Library
 from ..motion import contacts, quaternion
 from ..motion.humanoid import heading_from_positions, identify
-from ..motion.motion import (
-    Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation,
-)
+from ..motion.motion import Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation
 from ..motion.retargeting.neutral import neutral_stance
 from ..motion.skeleton import Skeleton
 from ..synthesis.construct.ball.carry import Body, Resting, leg, limb_carried
 from ..synthesis.construct.ball.meeting import eased
 from ..synthesis.construct.stepped_over import stepped_over
+from ..synthesis.quality.jerk import jerk, uncut_windows, windowed
 
 FADE = 0.5
 """Seconds in which a throw goes over into what surrounds it, at either end."""

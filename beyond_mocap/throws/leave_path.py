@@ -15,8 +15,8 @@ from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.motion import Motion, forward_kinematics, resample
 from ..motion.track import Track, zero_phase_hann
-from ..synthesis.plan import Plan
 from ..synthesis.construct.ball.meeting import eased
+from ..synthesis.plan import Plan
 from .join_throw import FADE, blend_bodies, hold_ends
 from .run_up import SMOOTH, RunUpResult, construct_run_up
 
@@ -118,7 +118,8 @@ def _blended(part: _Stretch, new: Motion, leaves: int, comes: int) -> tuple[np.n
 
 
 def _warnings(part: _Stretch, library: Library, root: np.ndarray) -> list[str]:
-    fps, warnings = part.own.fps, []
+    fps = part.own.fps
+    warnings: list[str] = []
     if not part.comes_back:
         when = part.start + part.end / fps
         text = (

@@ -10,16 +10,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..base.vectors import unit_vector
+from ..annotation.striking import FOOT_RADIUS
+from ..ball.contact import striking_surface
+from ..ball.physics import Ball
 from ..base.errors import InputError
+from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics, pose_kinematics
-from ..annotation.striking import FOOT_RADIUS
 from ..synthesis.construct.ball.carry import arm, leg
-from ..ball.contact import striking_surface
-from ..ball.physics import Ball
 from .struck import struck
 
 BEFORE, AFTER = 0.4, 0.4

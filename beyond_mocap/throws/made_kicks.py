@@ -10,20 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.time_series import interpolate
-from ..base.errors import InputError
-from ..motion import quaternion
-from ..motion.retargeting.adult import adult_skeleton
-from ..base.arctangent import arctan2
-from ..motion.retargeting.adult import LEG
-from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
-from ..motion.motion import Motion, place
-from ..motion.retargeting.neutral import Neutral, neutral_stance
-from ..motion.skeleton import Skeleton
 from ..annotation.striking import FOOT_RADIUS
 from ..ball.physics import FOOTBALL, Ball
-from .struck import struck
 from ..ball.wall import meets_wall
+from ..base.arctangent import arctan2
+from ..base.errors import InputError
+from ..base.time_series import interpolate
+from ..motion import quaternion
+from ..motion.motion import Motion, place
+from ..motion.retargeting.adult import LEG, adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.skeleton import Skeleton
+from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
+from .struck import struck
 
 SLOWEST, FASTEST = 6.0, 36.0
 """m/s of a ball."""
@@ -118,7 +117,7 @@ class _Aim:
             turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
             spun = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([rate * velocity, rate * spin]))
             met, _ = meets_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
-            near = near or np.linalg.norm(met - target) < _HIT
+            near = near or bool(np.linalg.norm(met - target) < _HIT)
             if exact and np.linalg.norm(met - target) < _HIT:
                 break
             up += float(np.arctan2(target[2] - met[2], away))
@@ -128,7 +127,7 @@ class _Aim:
                 "kick", f"a ball of {speed:g} m/s passes the target by {np.linalg.norm(met - target):.2f} m",
                 "a target that it can reach", "kick faster, or aim lower or nearer",
             )
-        motion = kicked(self.style, self.neutral, self.foot, *way, rate, turn, fps)
+        motion = kicked(self.style, self.neutral, self.foot, way[0], way[1], rate, turn, fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
         return Kick(place(motion, 0.0, back), BEFORE / rate, self.foot, start, *spun)
 

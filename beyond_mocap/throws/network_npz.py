@@ -1,5 +1,5 @@
-"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays, with one
-JSON text for what is no array. Nothing in it is ever executed."""
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays,
+with one JSON text for what is no array. Nothing in it is ever executed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from dataclasses import asdict, fields
 import numpy as np
 
 from ..base.errors import InputError
+from ..files.content import content
+from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
+from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.whole import atomic_write
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .networks.chains import EFFECTORS
 from .networks.example import Example
 from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
-from ..files.content import content
-from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, whole_number
-from ..files.plain_npz import HEADER, header_text, plain_arrays
-from ..files.whole import atomic_write
 
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
@@ -166,7 +166,7 @@ def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
     if not all(0 <= end < len(names) for end in ends):
         raise InputError("skeleton: end_parents", shown(ends), f"joints 0 to {len(names) - 1}")
     offsets, end_offsets = _taken(arrays, "offsets", (len(names), 3)), _taken(arrays, "end_offsets", (len(ends), 3))
-    return Skeleton(names, parents, offsets, ends, end_offsets)
+    return Skeleton(tuple(names), tuple(parents), offsets, tuple(ends), end_offsets)
 
 
 def _reach(row) -> dict[str, tuple]:

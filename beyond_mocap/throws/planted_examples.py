@@ -19,14 +19,14 @@ from ..ball.wall import meets_wall
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
 from ..files.whole import atomic_write, whole_folder
-from .made_kicks import kick
 from ..motion import quaternion
+from ..motion.motion import Motion, place
 from ..synthetic.kick_subjects import kick_style, kicker
 from ..synthetic.kicks import KICKS
 from ..synthetic.made_people import Person
-from ..motion.motion import Motion, place
 from ..synthetic.throw_subjects import subject, subject_throws
 from ..synthetic.throws import GRAVITY
+from .made_kicks import kick
 from .throw_examples import LAUNCH, TABLE_NAME, TARGET
 
 COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH, "ball_x_m", "ball_y_m", "ball_z_m")

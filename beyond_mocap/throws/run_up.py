@@ -17,27 +17,27 @@ import numpy as np
 from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
 from ..base.easing import quintic_between
 from ..base.errors import InputError, TimedLine, told_time
-from ..synthesis.known_touches import solve_touches
-from ..library.features import joined as joined_frames
 from ..library.clip import Clip
-from ..library.library import Library
 from ..library.describe_clips import described
+from ..library.features import joined as joined_frames
+from ..library.library import Library
 from ..motion import contacts
 from ..motion.humanoid import heading
 from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, zero_phase_hann
-from ..synthesis.plan import Plan
-from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.search.balance import balanced
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.key_moments import find_touches, key_results
+from ..synthesis.known_touches import solve_touches
+from ..synthesis.plan import Plan
+from ..synthesis.resolve_plan import resolve_plan
+from ..synthesis.resolved_plan import ResolvedPlan
+from ..synthesis.search.balance import balanced
 from ..synthesis.search.edit_list import EditList
 from ..synthesis.search.footage import Footage, fetch, output_index
 from ..synthesis.search.path_search import PathSearch
-from ..synthesis.resolved_plan import ResolvedPlan
-from ..synthesis.search_library import search_library
 from ..synthesis.search.wanted import Wanted, build_order
+from ..synthesis.search_library import search_library
 
 OWN_WORD = "generated"
 """The word that only the generated clip carries."""
@@ -203,7 +203,7 @@ def _timeline_with_throw(
 ) -> tuple[Timeline, list[str]]:
     """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
     kept = [key for key in timeline.keys if not begin < key.in_force < finish]
-    told = [
+    told: list[str] = [
         TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept

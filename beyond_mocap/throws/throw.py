@@ -19,24 +19,24 @@ from ..ball.arcs import arcs, out_of_reach
 from ..ball.flight import Flight, Launch, fly
 from ..ball.impact import crossing
 from ..ball.physics import BALLS, FASTEST, THROWN, Ball
-from .correction import FINE, LITTLE, Corrected, Freedom, corrected
-from .letting_go import AtFoot, InHand, grip_point, leaving
+from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..base.arctangent import arctan2
 from ..motion.between_frames import cubic_at
-from ..synthetic.grip import grip_of
 from ..motion.humanoid import identify, stature
 from ..motion.mirror import mirror
 from ..motion.motion import Motion, place
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
+from ..motion.track.ball_path import BallPath
+from ..synthetic.grip import grip_of
 from ..synthetic.throws import FASTEST as FASTEST_HAND
+from .correction import FINE, LITTLE, Corrected, Freedom, corrected
+from .letting_go import AtFoot, InHand, grip_point, leaving
 from .networks.chains import EFFECTORS
 from .networks.limb_limits import LimbLimits
 from .networks.model import ThrowModel
 from .networks.plan import Planned, Wish, planned, unlike
-from ..motion.track.ball_path import BallPath
 
 KINDS: dict[str, Ball] = {**BALLS, **THROWN}
 """Balls by name."""
@@ -252,7 +252,7 @@ def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None =
 
 
 @lru_cache(maxsize=8)
-def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, ...]:
     """Where (E, 3) m, how fast (E, 3) m/s and with which spin (E, 3) rad/s such a ball leaves each example of the
     model; zero for those of another limb."""
     part = part_of(model.skeleton, limb, ball)

@@ -16,21 +16,23 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..annotation.labels import list_labels
-from ..ball.physics import BASEBALL, FOOTBALL
+from ..ball.physics import BASEBALL, FOOTBALL, Ball
 from ..ball.wall import meets_wall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
 from ..files.content import content
 from ..files.tables import number, read_rows
-from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME, Annotations, find_clips
+from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
+from ..library.scan import Annotations, find_clips
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
-from ..synthetic.grip import grip_of
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from .networks.chains import EFFECTORS as LIMBS, chains_of
+from ..synthetic.grip import grip_of
+from .networks.chains import EFFECTORS as LIMBS
+from .networks.chains import chains_of
 from .networks.example import Example, example_of, mirrored
 
 TABLE_NAME = "throws.csv"
@@ -60,7 +62,7 @@ class Action:
     before: tuple[float, float]
     after: tuple[float, float]
     wall: float
-    ball: object
+    ball: Ball
 
 
 ACTIONS = {
@@ -331,8 +333,8 @@ def _example(name: str, motion: Motion, known: _Known, action: Action, fps: floa
     there = bring(cut)
     if there is not cut:  # the same launch from another hand's place
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
-    span = tuple(second - first for second in _stretch(motion, known, action))
-    return example_of(name, who, there, limb, release, impact, launch, fps, span)
+    begin, end = _stretch(motion, known, action)
+    return example_of(name, who, there, limb, release, impact, launch, fps, (begin - first, end - first))
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core import channels
-from ..core import window
+from ..core import channels, window
 from ..core.live import Watcher, attempt
 from . import shots
 from .settings import MARK, aimed
@@ -75,4 +74,3 @@ def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
 WATCHER = Watcher(
     name="Aimed balls", changed=look_at, follow=follow, restored=shots.unsure, loaded=shots.forget, ends=shots.forget,
 )
-mark = WATCHER.mark

@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty
 
+from ..core import live
 from ..core.properties import with_settings
 from ..result.result import BeyondMocapBefore
 
@@ -15,9 +16,7 @@ group on objects, with which it would share its place before Blender 5.0."""
 
 def changed(_settings, _context) -> None:
     """A setting that the ball may have to follow."""
-    from . import live
-
-    live.mark()
+    live.mark("Aimed balls")
 
 
 @with_settings("aim", update=changed)

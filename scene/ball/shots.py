@@ -14,9 +14,9 @@ from ...beyond_mocap.motion import quaternion
 from ..core import channels, linked
 from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre
+from ..core.set_aside import bring_back, put_aside
 from ..passes.hits_shown import motion_of
 from ..passes.settings import KEPT
-from ..core.set_aside import bring_back, put_aside
 from .settings import MARK
 
 if TYPE_CHECKING:

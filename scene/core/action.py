@@ -10,8 +10,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, at_frames
 from ..rigs import armature

@@ -128,6 +128,11 @@ class Watcher:
         return TICK
 
 
+def mark(name: str) -> None:
+    """Mark the watcher of this name. For modules that the watcher's own module imports."""
+    next(watcher for watcher in _watchers if watcher.name == name).mark()
+
+
 def is_running(prefixes: tuple[str, ...]) -> bool:
     """Whether an operator whose name begins with one of these runs in any window."""
     windows = bpy.context.window_manager.windows

@@ -12,7 +12,7 @@ import bpy
 
 from .properties import with_settings
 
-EXTENSION = __package__.rpartition(".")[0]
+EXTENSION = __package__.removesuffix(".scene.core")
 
 
 @with_settings("preferences")

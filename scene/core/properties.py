@@ -47,6 +47,11 @@ def property_values(record: type, properties: bpy.types.PropertyGroup, *groups: 
     return collect(record, _shown(groups), lambda row: getattr(properties, row.identifier))
 
 
+def active_row(rows, number: int):
+    """The row of a list that is picked; None while the list is empty."""
+    return rows[number] if 0 <= number < len(rows) else None
+
+
 def _shown(groups: tuple[str, ...]) -> list[Setting]:
     """The settings of groups that panels have."""
     return [row for group in groups for row in rows_of(group) if row.tooltip]

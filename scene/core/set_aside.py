@@ -6,8 +6,8 @@ import json
 
 import bpy
 
-from . import channels
 from ..result.result import BeyondMocapBefore
+from . import channels
 
 STANDS = ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle", "scale")
 

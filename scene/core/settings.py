@@ -8,15 +8,21 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
 )
 
-from .properties import with_settings
+from ..overlays.settings import BeyondMocapView
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
-from ..timeline.video import BeyondMocapVideo, renew
-from .view_settings import BeyondMocapView
 from ..rigs.rig import BeyondMocapRig
+from ..timeline.video import BeyondMocapVideo, renew
+from .properties import active_row, with_settings
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
@@ -154,6 +160,4 @@ def as_setting(path: str) -> str:
 
 def active_player(settings: BeyondMocapSettings) -> BeyondMocapPlayer | None:
     """The player chosen in the list; None while the list is empty."""
-    if 0 <= settings.active_player < len(settings.players):
-        return settings.players[settings.active_player]
-    return None
+    return active_row(settings.players, settings.active_player)

@@ -9,9 +9,9 @@ import bpy
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, preferences
+from ..core.settings import absolute
 from ..rigs import armature
 from ..stage import body
-from ..core.settings import absolute
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import bpy
 
-from . import clips
 from ..core import window
 from ..core.live import Watcher
 from ..core.settings import absolute
+from . import clips
 
 SECONDS = 4.0  # between two looks
 

@@ -14,9 +14,9 @@ import numpy as np
 from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
-from ..result import bake
 from ..core import linked
 from ..core.measure import frames_per_second, units_per_metre
+from ..result import bake
 from . import lines, nodes
 from .settings import is_cloud
 

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
 )
 
 from ..core.properties import with_settings
@@ -80,7 +86,7 @@ def a_cloud(_own, thing) -> bool:
 
 
 @with_settings("markers.cloud", update=shown)
-@with_settings("markers.model.model")
+@with_settings("markers.model")
 class BeyondMocapCloud(bpy.types.PropertyGroup):
     """A trial that stands in the scene as a cloud of markers."""
 

@@ -12,12 +12,12 @@ from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked
-from ..rigs import armature
-from ..result import bake
-from ..stage import body
-from ..core.properties import property_values
 from ..core.measure import frames_per_second
+from ..core.properties import property_values
 from ..core.settings import absolute
+from ..result import bake
+from ..rigs import armature
+from ..stage import body
 from . import cloud as clouds
 from . import kept as store
 from . import models, sets, thrown
@@ -25,8 +25,8 @@ from .settings import is_alone, is_cloud
 
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.model.model import MarkerModel
-    from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings
+    from ...beyond_mocap.markers.trial import MarkerTrial
 
 MADE = "beyond_mocap_reconstructed"  # custom property of actions made here; no group has its name
 SKIN = (0.55, 0.55, 0.60)

@@ -10,17 +10,17 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..stage import ball as balls
 from ..core import channels, linked
 from ..core.measure import frames_per_second, units_per_metre
+from ..stage import ball as balls
 from . import cloud as clouds
 from . import kept as store
 from .settings import is_alone
 
 if TYPE_CHECKING:
+    from ...beyond_mocap.markers.release.release import Release, ReleaseSettings
     from ...beyond_mocap.markers.trial import MarkerTrial
     from ...beyond_mocap.motion.motion import Motion
-    from ...beyond_mocap.markers.release.release import Release, ReleaseSettings
 
 MADE = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions made here; no group's name
 

@@ -7,8 +7,8 @@ import numpy as np
 
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import action, channels
-from ..stage import ball
 from ..core.measure import frames_per_second, units_per_metre
+from ..stage import ball
 from . import ours
 from .people import Person
 

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.motion import Motion
-from ..rigs import armature
 from ..core.measure import units_per_metre
+from ..rigs import armature
 from . import ours
 from .kits import Kit, cloth, kit_of
 from .people import Person

@@ -10,9 +10,9 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.time_series import gaussian_smooth
 from ...beyond_mocap.base.vectors import unit_vectors
-from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics

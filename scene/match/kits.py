@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..stage.body import LOOKS
 from ..core.material import colour, made
+from ..stage.body import LOOKS
 from . import ours
 from .people import TEAMS, Person
 

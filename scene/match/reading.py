@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from ...beyond_mocap.base.errors import InputError
-from ..player import tracks
 from ..core.settings import absolute, as_setting
+from ..player import tracks
 from .kits import USUAL, linear
 from .people import TEAMS
 from .settings import AUTO, FIRST, BeyondMocapMatch

@@ -6,7 +6,13 @@ from __future__ import annotations
 import bpy
 import numpy as np
 from bpy.props import (
-    BoolProperty, CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    EnumProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    StringProperty,
 )
 
 from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
@@ -42,7 +48,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     position: StringProperty(name="Position", description="Where he plays, where the feed tells")
 
 
-@with_settings("match.section", "match.pieces.work", "match")
+@with_settings("match.section", "match.work", "match")
 class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 

@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.time_series import interpolate
+from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
 from ..stage import pitch, stage
-from ..core.measure import frames_per_second, units_per_metre
 from . import baked, cameras, ours
 from .bodies import Wardrobe
 from .people import Scenery

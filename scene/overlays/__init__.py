@@ -1,5 +1,6 @@
 """What is drawn over the 3D view: where a take is off, where feet stood, where it is cut and why.
 
+- `settings`  which of it is drawn, per scene
 - `colours`   one table of colours that all eyes tell apart
 - `shapes`    vertex arrays of soles, rails, bars, figures
 - `prepare`   a take as vertex arrays and lines of text; knows neither bpy nor gpu

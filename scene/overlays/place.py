@@ -8,6 +8,7 @@ from mathutils import Matrix
 from ..core.action import PLACED
 from ..core.measure import frames_per_second, units_per_metre
 
+
 def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
     """What the tracking file's clock shows at a scene frame, or now."""
     settings = scene.beyond_mocap

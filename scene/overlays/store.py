@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ..core import background, session
-from ..core import window
+from ..core import background, session, window
 from ..core.live import Watcher, soon
-from ..core.settings import active_player
+from ..core.properties import active_row
 from . import place
 
 if TYPE_CHECKING:
@@ -36,7 +35,7 @@ def shown_players(settings) -> list:
     """The players that the overlays are about."""
     if settings.view.players == "TICKED":
         return [player for player in settings.players if player.use and player.take]
-    player = active_player(settings)
+    player = active_row(settings.players, settings.active_player)
     return [player] if player is not None and player.take else []
 
 
@@ -64,7 +63,7 @@ def clear() -> None:
 def tell_why(scene: bpy.types.Scene) -> None:
     """Put the text about the piece at the playhead where the panel finds it."""
     manager, settings = bpy.context.window_manager, scene.beyond_mocap
-    player = active_player(settings)
+    player = active_row(settings.players, settings.active_player)
     found = prepared(player.take) if player is not None and player.take else None
     piece = found.piece(place.seconds_at(scene)) if found else None
     text = "\n".join(piece.lines) if piece else ""
@@ -86,7 +85,7 @@ def _frame_changed(scene) -> None:
 def _missing(scene: bpy.types.Scene) -> list[tuple]:
     """(name, plan, take, library) of takes that are to be shown and not prepared."""
     settings = scene.beyond_mocap
-    players = [*shown_players(settings), *filter(None, [active_player(settings)])]
+    players = [*shown_players(settings), *filter(None, [active_row(settings.players, settings.active_player)])]
     names = dict.fromkeys(player.take for player in players if player.take)
     orders = []
     for name in names:
@@ -133,5 +132,6 @@ def _poll() -> float | None:
 
 
 WATCHER = Watcher(
-    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed, ends=clear
+    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed,
+    ends=clear,
 )

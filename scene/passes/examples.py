@@ -8,7 +8,8 @@ import bpy
 
 from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.base.errors import InputError
-from ..path_editing.carrier import MARK, carrier_of
+from ..path_editing.carrier import MARK
+from ..path_editing.rigs import carrier_of
 from . import hits_shown
 from .settings import BeyondMocapPass, BeyondMocapPasses
 

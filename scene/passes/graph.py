@@ -10,8 +10,7 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ...beyond_mocap.base.digest import byte_digest
-from .settings import BeyondMocapHits, found_of
+from .settings import BeyondMocapHits, found_of, picture_name, pictures
 
 SIZE = 480
 """Pixels of the picture's width and height."""
@@ -22,27 +21,17 @@ _HIGH, _FAST, _LEVEL = (0.95, 0.25, 0.22), (0.90, 0.30, 0.90), (0.60, 0.52, 0.20
 _STRETCH, _MOTION, _PLAYHEAD = (0.95, 0.25, 0.22), (0.28, 0.45, 0.95), (0.95, 0.75, 0.2)
 _EDGE, _BARS = 6, 44  # pixels round the curves, and of the bars at the foot
 
-_shown: dict[str, bpy.utils.previews.ImagePreviewCollection] = {}
-
-
-def icon_of(hits: BeyondMocapHits) -> int:
-    """The picture's number for a layout; 0 while it is not painted."""
-    kept = _shown.get("graphs")
-    name = _name(hits.found)
-    return kept[name].icon_id if kept is not None and name in kept else 0
-
-
 def paint(hits: BeyondMocapHits) -> None:
     """Paint the picture of an analysis, where there is one and it is not painted yet."""
-    name = _name(hits.found)
+    name = picture_name(hits)
     if bpy.app.background or not hits.found:
         return
-    if "graphs" not in _shown:
-        _shown["graphs"] = bpy.utils.previews.new()
-    if name in _shown["graphs"]:
+    if "graphs" not in pictures:
+        pictures["graphs"] = bpy.utils.previews.new()
+    if name in pictures["graphs"]:
         return
     pixels = picture(found_of(hits))
-    preview = _shown["graphs"].new(name)
+    preview = pictures["graphs"].new(name)
     preview.image_size = pixels.shape[1], pixels.shape[0]
     preview.image_pixels_float = pixels.ravel().tolist()
 
@@ -87,9 +76,9 @@ def frame_at(found: dict, share: float) -> float:
 
 def forget() -> None:
     """Take all pictures away."""
-    for kept in _shown.values():
+    for kept in pictures.values():
         bpy.utils.previews.remove(kept)
-    _shown.clear()
+    pictures.clear()
 
 
 def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
@@ -102,7 +91,3 @@ def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
     rows = np.arange(SIZE)[:, None]
     cover = np.clip(np.minimum(rows + 0.5 - low, high - rows + 0.5), 0.0, 1.0)[..., None]
     image[:, _EDGE : SIZE - _EDGE, :3] += cover * (np.array(colour) - image[:, _EDGE : SIZE - _EDGE, :3])
-
-
-def _name(found: str) -> str:
-    return byte_digest(found, size=8).hex()

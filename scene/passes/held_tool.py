@@ -9,8 +9,8 @@ from mathutils import Matrix, Vector
 
 from ...beyond_mocap.base.vectors import unit_vector
 from ...beyond_mocap.motion.humanoid import identify
-from ..rigs import armature
 from ..core.material import colour
+from ..rigs import armature
 from .settings import KEPT
 
 HANDLE = 0.6  # of the thickness of what strikes

@@ -11,14 +11,13 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked
-from ..path_editing.carrier import carrier_of
 from ..core.live import Watcher
-from ..path_editing.rigs import rides_as_rig
+from ..path_editing.rigs import carrier_of, rides_as_rig
 from . import graph
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.passes.hits import Hits
     from ...beyond_mocap.motion.motion import Motion
+    from ...beyond_mocap.passes.hits import Hits
 
 MARKER = "hit"  # the names of our markers begin with it
 _COLUMNS = 480
@@ -39,7 +38,8 @@ def analyse(
 ) -> "Hits":
     """Find the strikes in an armature's motion, note them for the panel and mark them on its action.
 
-    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to mark.
+    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to
+    mark.
     """
     from ...beyond_mocap.passes.hits import analyse as find
 

@@ -11,10 +11,9 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError
-from ..core import background
-from ..core import window
+from ..core import background, window
 from ..core.live import Watcher, is_playing
-from . import rally
+from . import make, rally
 from .settings import PLAYED
 
 KIND = "flights"
@@ -25,8 +24,6 @@ _running: list[background.Job] = []  # at most one
 
 def edited(scene: bpy.types.Scene) -> str:
     """Digest of what is asked for, where it is another than what is shown was made of; else empty."""
-    from . import make
-
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
         return ""
@@ -67,8 +64,6 @@ def _busy() -> bool:
 
 def _drag(scene) -> None:
     """Take in the flights that have been worked out, and begin with those of where everybody is now."""
-    from . import make
-
     if _busy():
         return
     if _running:
@@ -107,4 +102,3 @@ def forget() -> None:
 WATCHER = Watcher(
     name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=rally.forget, ends=forget,
 )
-mark = WATCHER.mark

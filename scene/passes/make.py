@@ -10,19 +10,19 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.ball.contact import Tool
-from ...beyond_mocap.passes.pass_scene import Net, PassScene
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.passes.pass_scene import Net, PassScene
 from ..core import action, channels, linked, preferences, session
-from ..rigs import armature
-from ..result import bake
-from ..stage import ball, body
 from ..core.measure import frames_per_second, units_per_metre
-from ..path_editing import riders
 from ..core.set_aside import bring_back, drop, put_aside
 from ..core.settings import absolute
-from . import order as asked
+from ..path_editing import riders
+from ..result import bake
+from ..rigs import armature
+from ..stage import ball, body
 from . import held_tool, possession, rally, shown
+from . import order as asked
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.ball.contact import Tool
-from ...beyond_mocap.passes.pass_scene import GROUND, LIMITS, BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ...beyond_mocap.base.errors import InputError
-from ..result import bake
+from ...beyond_mocap.passes.pass_scene import GROUND, LIMITS, BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..core.measure import frames_per_second, units_per_metre
+from ..result import bake
 from . import examples, shown
 from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasses
 

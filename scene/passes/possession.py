@@ -20,12 +20,12 @@ from mathutils import Matrix, Quaternion, Vector
 from ...beyond_mocap.base.easing import smoothstep
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
-from ..rigs import armature
 from ..core import channels, linked
 from ..core.measure import frames_per_second, units_per_metre
+from ..core.set_aside import bring_back, put_aside
 from ..path_editing.rig_look import alone
 from ..result.result import BeyondMocapBefore
-from ..core.set_aside import bring_back, put_aside
+from ..rigs import armature
 from .settings import KEPT, BeyondMocapHold
 
 CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it

@@ -10,8 +10,8 @@ import bpy
 import numpy as np
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.passes.pass_plan import PassPlan
     from ...beyond_mocap.ball.physics import Ball
+    from ...beyond_mocap.passes.pass_plan import PassPlan
 
 STEP = 0.03  # s between two points of a way
 MOST = 40  # candidates of a strike that are kept

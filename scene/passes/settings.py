@@ -6,11 +6,22 @@ import json
 
 import bpy
 from bpy.props import (
-    BoolProperty, CollectionProperty, FloatProperty, FloatVectorProperty, IntProperty, PointerProperty, StringProperty,
+    BoolProperty,
+    CollectionProperty,
+    FloatProperty,
+    FloatVectorProperty,
+    IntProperty,
+    PointerProperty,
+    StringProperty,
 )
 
-from ..core.properties import with_settings
+from ...beyond_mocap.base.digest import byte_digest
+from ..core import live
+from ..core.properties import active_row, with_settings
 from ..result.result import BeyondMocapBefore
+
+pictures: dict = {}
+"""The painted pictures of hit analyses: a preview collection under "graphs", while there are any."""
 
 SAMPLES = (
     ("three", "Three", "Three players, a triangle of passes"),
@@ -25,9 +36,7 @@ KEPT = "beyond_mocap_scene_ball"  # custom property of balls and actions made he
 
 def touch_live(_settings, _context) -> None:
     """A change that a solved scene may have to follow."""
-    from . import live
-
-    live.mark()
+    live.mark("Passing scene")
 
 
 def renamed(player, context) -> None:
@@ -176,11 +185,6 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
     solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Lines about the ball that was solved")
 
 
-def active_row(rows, number: int):
-    """The row of a list that is picked; None while the list is empty."""
-    return rows[number] if 0 <= number < len(rows) else None
-
-
 def subject(context: bpy.types.Context) -> bpy.types.Object | None:
     """The armature that is meant: the active object, or else the body of the picked player."""
     active = context.view_layer.objects.active
@@ -212,3 +216,14 @@ def told_lines(text: str) -> list[tuple[int, str]]:
 def found_of(hits: BeyondMocapHits) -> dict:
     """What a hit analysis found; empty where there was none."""
     return json.loads(hits.found or "{}")
+
+
+def picture_name(hits: BeyondMocapHits) -> str:
+    """The name of the picture of an analysis: another one for other curves."""
+    return byte_digest(hits.found, size=8).hex()
+
+
+def picture_icon(hits: BeyondMocapHits) -> int:
+    """The picture's number for a layout; 0 while it is not painted (`graph.paint`)."""
+    kept, name = pictures.get("graphs"), picture_name(hits)
+    return kept[name].icon_id if kept is not None and name in kept else 0

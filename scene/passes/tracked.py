@@ -10,14 +10,14 @@ import numpy as np
 
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
-from ..result import bake
-from ..stage import ball
 from ..core import channels, linked
-from ..player import dots, tracks
-from ..timeline import lanes, lay_strips, strips
 from ..core.clock import of_scene
 from ..core.measure import frames_per_second
-from ..core.settings import BeyondMocapPlayer, active_player, absolute
+from ..core.settings import BeyondMocapPlayer, absolute, active_player
+from ..player import dots, tracks
+from ..result import bake
+from ..stage import ball
+from ..timeline import lanes, lay_strips, strips
 from ..timeline.strip_lines import said
 from . import possession
 from .settings import KEPT

@@ -13,9 +13,8 @@ from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs.bone_curves import is_carried
 from . import rig_look, rig_parts
-from .carrier import carrier_of
 from .rig_source import Played, playing_strips
-from .rigs import rides_as_rig
+from .rigs import carrier_of, rides_as_rig
 
 HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
 _A_SECOND = 5  # looks at a rig

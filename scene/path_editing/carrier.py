@@ -1,6 +1,6 @@
 """What carries a motion: how an armature's motion is read, and how the ridden one is written onto it.
 
-`PlainCarrier` knows armatures whose bones are keyed themselves. `carrier_of` chooses; other kinds stand beside it.
+`PlainCarrier` knows armatures whose bones are keyed themselves. Other kinds are in `rigs`, where `carrier_of` chooses.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels, linked
-from ..rigs import armature
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
+from ..rigs import armature
 from . import keys
 
 MARK = "beyond_mocap_ride"
@@ -207,13 +207,6 @@ class PlainCarrier(Carrier):
             mode = bones[joint].rotation_mode
             found |= _columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
         return found
-
-
-def carrier_of(body: bpy.types.Object) -> Carrier:
-    """What carries this armature's motion."""
-    from .rigs import RigCarrier, rides_as_rig  # which build on what is above
-
-    return RigCarrier(body) if rides_as_rig(body) else PlainCarrier(body)
 
 
 def _path(bone: bpy.types.PoseBone, what: str) -> str:

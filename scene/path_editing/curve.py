@@ -9,11 +9,11 @@ import numpy as np
 from mathutils import Vector
 
 from ...beyond_mocap.base.digest import byte_digest
-from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion.path.path import Path
-from ..player.drawn_track import points_of
 from ..core.measure import units_per_metre
+from ..player.drawn_track import points_of
 
 KINDS = (
     ("BEZIER", "Bezier", "Points on the path, with handles"),

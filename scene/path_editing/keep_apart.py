@@ -16,7 +16,8 @@ from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core.measure import frames_per_second
 from . import curve, riders, source
 from .bystanders import bystanders
-from .carrier import MARK, carrier_of
+from .carrier import MARK
+from .rigs import carrier_of
 from .settings import riders as all_riders
 from .settings import wishes
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
+
 Place = tuple[str, int]
 
 

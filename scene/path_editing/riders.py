@@ -14,7 +14,8 @@ from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..core import channels, linked
 from ..core.set_aside import drop, play_as_before
 from . import curve, keys, source
-from .carrier import MARK, carrier_of
+from .carrier import MARK
+from .rigs import carrier_of
 from .settings import choose, riders, wishes
 
 _SAMPLES = 400

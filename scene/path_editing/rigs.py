@@ -15,15 +15,15 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
-from ..rigs import armature
 from ..core import channels
 from ..core.action import PLACED
 from ..core.measure import frames_per_second, units_per_metre
-from ..rigs.posing import CHANNELS
-from ..rigs.bone_curves import is_carried
 from ..core.set_aside import play_as_before, put_aside, stance_of, stand
+from ..rigs import armature
+from ..rigs.bone_curves import is_carried
+from ..rigs.posing import CHANNELS
 from . import keys, rig_parts
-from .carrier import MARK, Carrier, Read
+from .carrier import MARK, Carrier, PlainCarrier, Read
 from .rig_source import BONE, RigSource, layered, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
@@ -164,6 +164,11 @@ class RigCarrier(Carrier):
             data.use_nla, data.action_influence, data.action_blend_type, data.action_extrapolation = mine[2:]
             stand(body, now)
             body.update_tag(refresh={"OBJECT", "DATA", "TIME"})
+
+
+def carrier_of(body: bpy.types.Object) -> Carrier:
+    """What carries this armature's motion."""
+    return RigCarrier(body) if rides_as_rig(body) else PlainCarrier(body)
 
 
 def rides_as_rig(body: bpy.types.Object) -> bool:

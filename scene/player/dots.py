@@ -9,11 +9,11 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion.track import Track
-from ..result import bake
 from ..core import channels
 from ..core.clock import Clock, of_scene
 from ..core.measure import units_per_metre
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
+from ..result import bake
 from .tracks import read_track
 
 BALL = "Ball dot"

@@ -7,10 +7,10 @@ import numpy as np
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ...beyond_mocap.base.errors import InputError
-from . import drawn_track
 from ..core.live import Watcher
 from ..core.measure import units_per_metre
 from ..core.settings import active_player
+from . import drawn_track
 
 SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
 

@@ -12,15 +12,15 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import distance_along
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import distance_along
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.motion.track import Track
 from ...beyond_mocap.motion.track.drawn import along, moved, nurbs_line
-from ..rigs import armature
 from ..core import channels
 from ..core.clock import of_scene
 from ..core.measure import units_per_metre
+from ..rigs import armature
 
 FINE = 48  # straight pieces that a Bezier segment is cut into
 

@@ -9,9 +9,9 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.synthesis.plan import Pin
-from ..rigs import armature
 from ..core.clock import of_scene
 from ..core.measure import units_per_metre
+from ..rigs import armature
 
 PARTS = (
     ("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),

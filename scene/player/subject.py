@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import bpy
 
-from . import dots
-from ..timeline import lanes, strips
 from ..core.clock import Clock, of_scene
 from ..core.settings import active_player
+from ..timeline import lanes, strips
+from . import dots
 
 
 def subject(context: bpy.types.Context) -> bpy.types.Object | None:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.files.tracking import tracking
-from . import drawn_track
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from . import drawn_track
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.track import Track

@@ -10,12 +10,12 @@ from ...beyond_mocap.motion.track import sample
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
 from ..core import action, channels
-from ..rigs import armature
-from ..stage import ball, body, stage
-from ..player import curve
 from ..core.measure import frames_per_second, whole_frames
 from ..core.session import Made
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
+from ..player import curve
+from ..rigs import armature
+from ..stage import ball, body, stage
 
 COLLECTION = "Beyond Mocap"
 BALL = "Ball"

@@ -14,12 +14,12 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.synthesis.take import Take
-from . import bake, hand_keys
 from ..core import channels
 from ..core.action import PLACED
-from .bake import MARK
 from ..core.measure import frames_per_second
 from ..core.set_aside import purge_action
+from . import bake, hand_keys
+from .bake import MARK
 
 TRACK = "Beyond Mocap"
 BLOCKS = "beyond_mocap_blocks"  # on an action: its pieces as JSON

@@ -10,10 +10,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from . import bake
 from ..core import channels, session
 from ..core.measure import frames_per_second, whole_frames
 from ..core.settings import BeyondMocapPlayer
+from . import bake
 
 GROUP = "Beyond Mocap"
 MARK = "beyond_mocap_error_curves"
@@ -73,9 +73,9 @@ def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
 
 def _values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     """(C, T) in the order of CURVES; where nothing is known 0, since a key needs a number."""
-    from ...beyond_mocap.synthesis.quality.played import played_from_take
     from ...beyond_mocap.evaluation.per_frame import per_frame
     from ...beyond_mocap.evaluation.view import View
+    from ...beyond_mocap.synthesis.quality.played import played_from_take
 
     take, unit = made.take, scene.beyond_mocap.library_unit or None
     library = session.library(made.plan.library, unit) if made.plan.library else None

@@ -22,11 +22,10 @@ from bpy.props import IntProperty, StringProperty
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ...beyond_mocap.synthesis.plan import Plan
-from ..core import background, channels, session
-from . import bake, blocks, hand_keys, plans, queue
-from ..core import window
+from ..core import background, channels, session, window
 from ..core.live import Watcher, is_playing
 from ..core.settings import BeyondMocapPlayer, absolute
+from . import bake, blocks, hand_keys, plans, queue
 
 SECONDS = 1.0  # between two looks
 LIBRARY_SECONDS = 10.0  # between two looks at the library's folder

@@ -13,8 +13,8 @@ from time import perf_counter
 import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError
-from . import freshness, plans, queue
 from ..core.live import Watcher, is_playing
+from . import freshness, plans, queue
 
 WHOLE = 0.8  # seconds without a change after which a quick take is made as well as it can be
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)

@@ -13,9 +13,9 @@ from ...beyond_mocap.annotation import validate
 from ...beyond_mocap.base.errors import InputError, NotInLibrary
 from ...beyond_mocap.synthesis.plan import Plan
 from ...beyond_mocap.synthesis.take import Take
-from . import freshness, plans, preview
 from ..core import preferences, session
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from . import freshness, plans, preview
 
 if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and switching on has to be quick
     from ...beyond_mocap.library.library import Library

@@ -6,11 +6,11 @@ from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.track import Track, clean
 from ...beyond_mocap.synthesis.plan import Plan
-from ..player import pins
-from ..timeline import strips
 from ..core.properties import property_values
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from ..player import pins
 from ..player.tracks import read_track
+from ..timeline import strips
 from ..timeline.written import written_in, written_words
 
 

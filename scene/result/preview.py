@@ -8,15 +8,15 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from . import bake, blocks, error_curves, hand_keys
 from ..core import channels, linked, session
-from ..stage import stage
-from .bake import MARK
 from ..core.clock import of_scene
-from ..passes import possession
-from ..path_editing import riders
 from ..core.set_aside import bring_back, drop, play_as_before, put_aside
 from ..core.settings import BeyondMocapPlayer
+from ..passes import possession
+from ..path_editing import riders
+from ..stage import stage
+from . import bake, blocks, error_curves, hand_keys
+from .bake import MARK
 
 STEPS = ("recipe", "made_of")
 LINES = ("take", "quality", "moments", "warnings")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from . import blocks
-from ..timeline import lanes, strips
 from ..core.clock import of_scene
 from ..core.settings import BeyondMocapPlayer, active_player
+from ..timeline import lanes, strips
+from . import blocks
 
 
 def selected(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:

@@ -6,9 +6,9 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from . import preview
 from ..core import session
 from ..core.settings import BeyondMocapPlayer
+from . import preview
 
 LINES = ("quality", "moments", "warnings", "recipe")
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
-from . import armature
 from ..core.measure import units_per_metre
+from . import armature
 from .driven import Driven
 
 

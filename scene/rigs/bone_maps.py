@@ -18,6 +18,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.files.whole import atomic_write
 from ...beyond_mocap.motion.humanoid import Humanoid, identify, roles_of, side_and_part
 from ...beyond_mocap.motion.skeleton import Skeleton
+from ..core.preferences import EXTENSION
 
 SPINES, NECKS = 6, 3
 _LIMB = {
@@ -178,9 +179,8 @@ def fingerprint(rig: bpy.types.Object) -> str:
 
 def kept_folder(create: bool = False) -> Path | None:
     """Where maps are kept by skeleton, in the user's folder of this extension; None where Blender offers none."""
-    package = __package__.rpartition(".")[0]
     try:
-        return Path(bpy.utils.extension_path_user(package, path="bone_maps", create=create))
+        return Path(bpy.utils.extension_path_user(EXTENSION, path="bone_maps", create=create))
     except (ValueError, OSError):  # run beside Blender, not as an extension
         return None
 

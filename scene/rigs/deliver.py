@@ -14,10 +14,10 @@ import bpy
 
 from ...beyond_mocap.synthesis.take import Take
 from ..core import action
-from . import armature, export
+from ..match import load, show
 from ..result import bake
 from ..stage import ball, body
-from ..match import load, show
+from . import armature, export
 
 if TYPE_CHECKING:
     from ...beyond_mocap.match.make import MatchResult

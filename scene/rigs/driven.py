@@ -7,12 +7,12 @@ import re
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.skeleton import Skeleton
-from . import armature, bone_maps
 from ..core import channels
+from . import armature, bone_maps
 from .controls import Controls, list_overrides
 from .followers import list_targets
 

@@ -15,14 +15,14 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.files.whole import beside
 from ...beyond_mocap.motion import quaternion
-from . import bone_maps
 from ..core import channels
 from ..core.aside import scene_aside
 from ..core.measure import frames_per_second, units_per_metre
+from . import bone_maps
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
-from . import armature
-from ...beyond_mocap.base.vectors import nearest_axis
 from .driven import Driven
 from .source import Source
 
@@ -45,8 +44,8 @@ class Fit:
 
     def __init__(self, driven: Driven, source: Source, options: BakeOptions):
         from ...beyond_mocap.motion import contacts  # these bring scipy, which is slow to import
-        from ...beyond_mocap.motion.retargeting.retarget import Retargeter
         from ...beyond_mocap.motion.foot_plant import plant
+        from ...beyond_mocap.motion.retargeting.retarget import Retargeter
 
         if options.exact:
             self.scale, self.slides, self.motion, self.told = 1.0, 3 * (Slide(0.0, 0.0),), source.motion, []
@@ -100,7 +99,7 @@ def _looking_ahead(skeleton: Skeleton, source: Skeleton) -> Skeleton:
     body = identify(source)
     if body.head is None or body.head not in source.end_parents or "Head" not in skeleton.names:
         return skeleton
-    rest = armature.rest_positions(source)
+    rest = source.rest_positions
     crown = source.end_offsets[source.end_parents.index(body.head)]
     across = rest[body.left.upper_leg] - rest[body.right.upper_leg]
     trunk = rest[body.head] - 0.5 * (rest[body.left.upper_leg] + rest[body.right.upper_leg])

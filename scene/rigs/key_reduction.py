@@ -12,8 +12,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from . import bake_record

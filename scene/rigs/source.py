@@ -11,8 +11,8 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels
-from . import armature
 from ..core.measure import frames_per_second, units_per_metre
+from . import armature
 
 
 @dataclass(frozen=True, eq=False)

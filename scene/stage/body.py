@@ -5,8 +5,8 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from ..rigs import armature
 from ..core.material import colour
+from ..rigs import armature
 
 LOOKS = {  # linear RGB of what is the same on all players
     "skin": (0.46, 0.24, 0.15),

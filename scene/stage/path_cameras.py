@@ -14,8 +14,8 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
-from ...beyond_mocap.base.time_series import gaussian_smooth
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.time_series import gaussian_smooth
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..path_editing import riders as rides

@@ -6,8 +6,8 @@ import bpy
 import numpy as np
 
 from ..core import channels
-from . import pitch
 from ..core.measure import units_per_metre
+from . import pitch
 
 NAME = "Stage"
 FOCUS = "Stage focus"

@@ -12,9 +12,9 @@ from collections import deque
 
 import bpy
 
-from ...beyond_mocap.passes.hits import HitMotion
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.passes.hits import HitMotion
 from ...beyond_mocap.passes.stream.listener import Listener, poses
 from ..core import window
 from ..core.live import Watcher, attempt

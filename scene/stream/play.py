@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from ...beyond_mocap.passes.hits import HitMotion
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.passes.hits import HitMotion
 from ..core import action, background, linked
-from ..result import bake
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
 from ..passes import make
 from ..passes.settings import PLAYED
+from ..result import bake
 from . import follow
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ class Begun:
 
 def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
     """Build the library where it is not there yet, and let everybody stand. Never touches bpy."""
-    from ...beyond_mocap.passes import live_passes
     from ...beyond_mocap.library.build import build
+    from ...beyond_mocap.passes import live_passes
 
     library = order.library
     if library is None:
@@ -226,4 +226,4 @@ def _after_undo() -> None:
         _over("Undo has ended Play Live: press it to begin anew")
 
 
-WATCHER = Watcher(name="Play Live", restored=_after_undo, ends=stop)
+WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop, ends=stop)

@@ -47,11 +47,4 @@ def hits() -> LiveHits | None:
     return _held.get("hits")
 
 
-def _before_load() -> None:
-    from . import play
-
-    play.stop()
-    stop()
-
-
-WATCHER = Watcher(name="Stream's listener", closing=_before_load, ends=stop)
+WATCHER = Watcher(name="Stream's listener", closing=stop, ends=stop)

@@ -10,10 +10,10 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core import action
-from ..rigs import armature
-from ..result import bake
-from ..stage import body
 from ..core.measure import frames_per_second
+from ..result import bake
+from ..rigs import armature
+from ..stage import body
 
 MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)

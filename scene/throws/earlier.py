@@ -9,8 +9,8 @@ from mathutils import Matrix
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
 from ..core.measure import units_per_metre
-from ..passes import possession
 from ..core.set_aside import stance_of
+from ..passes import possession
 from .settings import BeyondMocapThrow
 
 

@@ -13,15 +13,15 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion import quaternion
-from ..stage import ball as balls
-from ..result import bake
-from ..core import channels
 from ..ball.shots import CLOSEST, trajectory
+from ..core import channels
 from ..core.measure import units_per_metre
+from ..core.set_aside import bring_back, drop, put_aside
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
-from ..core.set_aside import bring_back, drop, put_aside
+from ..result import bake
+from ..stage import ball as balls
 from . import earlier
 from .settings import MARK, BeyondMocapThrow
 

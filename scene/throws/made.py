@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from ...beyond_mocap.ball.flight import Flight
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
-    from ...beyond_mocap.throws.throw import Thrown
     from ...beyond_mocap.throws.join_throw import JoinedThrow
+    from ...beyond_mocap.throws.throw import Thrown
 
 FOLLOWED, LONGEST = 3.0, 10.0
 """Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""

@@ -14,10 +14,10 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked, preferences, session
-from ..rigs import armature
 from ..core.measure import frames_per_second
-from ..passes import possession
 from ..core.settings import absolute
+from ..passes import possession
+from ..rigs import armature
 from . import earlier, rigged, targets
 from .settings import LIMBS, USUAL
 

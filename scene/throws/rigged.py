@@ -9,11 +9,9 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..rigs import bone_maps, rig_bake
 from ..core import channels
-from ..path_editing.carrier import carrier_of
-from ..path_editing.rigs import is_plain
-from ..rigs import bake_record
+from ..path_editing.rigs import carrier_of, is_plain
+from ..rigs import bake_record, bone_maps, rig_bake
 from ..rigs.driven import Driven, check
 from ..rigs.fit import BakeOptions
 from ..rigs.source import Source

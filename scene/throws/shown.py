@@ -8,11 +8,11 @@ import bpy
 import numpy as np
 
 from ..core import action, channels, linked, session
+from ..core.measure import frames_per_second
+from ..core.set_aside import bring_back, drop, put_aside
 from ..result import bake
 from ..rigs.bake_record import BEFORE, KEYS
 from ..rigs.bake_record import MARK as BAKE_MARK
-from ..core.measure import frames_per_second
-from ..core.set_aside import bring_back, drop, put_aside
 from . import flown, order, rigged
 from .settings import MARK
 

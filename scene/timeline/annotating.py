@@ -16,12 +16,12 @@ from ...beyond_mocap.annotation import KeyMoment, Span, annotating, swap_sides
 from ...beyond_mocap.annotation.annotating import AddMoment, AddSpan, AtPlayhead, Command, Go, Now, Tell
 from ...beyond_mocap.annotation.decision import Held
 from ...beyond_mocap.base.errors import InputError
-from . import lanes, lay_strips, word_checks
 from ..core import session
-from ..player import subject
 from ..core.clock import Clock, of_scene
-from .lanes import PlacedMoment, PlacedSpan
 from ..core.settings import absolute, active_player
+from ..player import subject
+from . import lanes, lay_strips, word_checks
+from .lanes import PlacedMoment, PlacedSpan
 
 AT_PLAYHEAD = 0.06
 """Seconds from the playhead at which a key moment counts as being there, at least a frame."""

@@ -14,11 +14,11 @@ import bpy
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline, clip_annotations
 from ...beyond_mocap.base.errors import InputError
 from ..core import action
-from . import lanes, lay_strips
 from ..core.clock import Clock
 from ..core.measure import frames_per_second
-from ..library.recordings import FOLDER, PATH
 from ..core.settings import absolute
+from ..library.recordings import FOLDER, PATH
+from . import lanes, lay_strips
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion

@@ -12,8 +12,21 @@ from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
 from ..core.clock import Clock, nearest_frame
 from .lanes import (
-    AUTOMATIC, MOMENTS, WORDS, PlacedMoment, PlacedSpan, lane_number, marker_frame, moments, placed_span, shows, spans,
-    strip_named, strips, within, written_for,
+    AUTOMATIC,
+    MOMENTS,
+    WORDS,
+    PlacedMoment,
+    PlacedSpan,
+    lane_number,
+    marker_frame,
+    moments,
+    placed_span,
+    shows,
+    spans,
+    strip_named,
+    strips,
+    within,
+    written_for,
 )
 from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
 

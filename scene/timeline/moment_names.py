@@ -9,10 +9,10 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import lanes
 from ..core import window
 from ..core.live import Watcher
 from ..player.subject import subject
+from . import lanes
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
 BOTTOM, TOP = 24, 26  # points that stay free for the scroll bar and the frame numbers

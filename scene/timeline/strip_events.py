@@ -12,10 +12,10 @@ import bpy
 
 from ...beyond_mocap.annotation import Span
 from ...beyond_mocap.base.errors import InputError
-from ..player import dots
-from . import moment_names, word_checks
 from ..core.clock import Clock, of_scene
 from ..core.live import Watcher, is_running, soon
+from ..player import dots
+from . import moment_names, word_checks
 from .lanes import AUTOMATIC, WORDS, has, is_lane, marker_frame, shows, strips, written_for
 from .lay_strips import lane_with_room, place, place_all, relay
 from .strip_lines import base_name, frames_of, key_of, line_of, recorded_span, remember, span_of, tell, words_of

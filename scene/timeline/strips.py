@@ -6,13 +6,13 @@ import bpy
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..player import dots
-from . import lanes, lay_strips
 from ..core.clock import Clock, of_scene
-from .lanes import PlacedMoment, PlacedSpan
 from ..core.settings import BeyondMocapPlayer
-from .strip_lines import said
+from ..player import dots
 from ..player.tracks import read_track
+from . import lanes, lay_strips
+from .lanes import PlacedMoment, PlacedSpan
+from .strip_lines import said
 from .written import written_words
 
 

@@ -8,11 +8,11 @@ import bpy
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, problems
 from ...beyond_mocap.base.errors import InputError
-from . import lanes
 from ..core import session
 from ..core.settings import absolute
-from .strip_lines import KEPT, base_name, key_of, span_of
 from ..player.subject import name_of
+from . import lanes
+from .strip_lines import KEPT, base_name, key_of, span_of
 
 
 class BeyondMocapProblem(bpy.types.PropertyGroup):

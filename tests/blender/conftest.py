@@ -25,13 +25,14 @@ _repository.mkdir(parents=True)
 (_repository / "beyond_mocap").symlink_to(SOURCE, target_is_directory=True)
 sys.modules["beyond_mocap"] = None
 
-import bpy  # noqa: E402
 import addon_utils  # noqa: E402  (bpy brings it)
+import bpy  # noqa: E402
 
 
 @atexit.register
 def without_blenders_own_leak():
-    """Blender never frees the properties of pose markers (our words' markers have some) and counts them as an error when
+    """Blender never frees the properties of pose markers (our words' markers have some) and counts them as an error
+    when
     it ends; that line alone is left out of what is printed from here on."""
     left_out = subprocess.Popen(["sed", "/^Error: Not freed memory blocks/d"], stdin=subprocess.PIPE)
     os.dup2(left_out.stdin.fileno(), 1)

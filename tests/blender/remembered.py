@@ -1,8 +1,8 @@
 """What operators work out between order and apply, worked out once for the same order.
 
-Work never touches bpy, and the same order gives the same bits (tests/core proves both). Where hundreds of calls try what
-operators read from a scene and write into it, the same few pieces of work come again and again; each is done once, and
-every further call gets the same frozen values.
+Work never touches bpy, and the same order gives the same bits (tests/core proves both). Where hundreds of calls try
+what operators read from a scene and write into it, the same few pieces of work come again and again; each is done
+once, and every further call gets the same frozen values.
 """
 
 import io

@@ -22,12 +22,13 @@ def test_three_buttons(extension, tmp_path):
     paths += [player.dot.beyond_mocap_dot.tracking_file for player in settings.players]
     assert len(paths) == 7 and all(path.startswith("//") for path in paths)
     rooms = {
-        name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("plans", "strips", "tracks")
+        name: importlib.import_module(f"{extension.__name__}.scene.{name}")
+        for name in ("result.plans", "timeline.strips", "player.tracks")
     }
     for player in settings.players:
-        track = rooms["tracks"].read_track(settings, player)
-        on_disk = rooms["plans"].written_words(player, settings.rate, track)
-        asked = rooms["strips"].read(player, bpy.context.scene)
+        track = rooms["player.tracks"].read_track(settings, player)
+        on_disk = rooms["result.plans"].written_words(player, settings.rate, track)
+        asked = rooms["timeline.strips"].read(player, bpy.context.scene)
         assert (asked.spans, asked.keys) == (on_disk.spans, on_disk.keys), "run sample_blend/make_quickstart.py again"
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}

@@ -8,21 +8,21 @@ import pytest
 
 from beyond_mocap.annotation import Timeline, parse_timeline
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
+from beyond_mocap.library.library import Library
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.synthetic.moves import getting_up
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.resting import on_the_side
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
+from beyond_mocap.synthetic.moves import getting_up
+from beyond_mocap.synthetic.resting import on_the_side
 
 # clip -> metres per second, words
 

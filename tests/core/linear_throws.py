@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from beyond_mocap.throws.made_kicks import kick
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.made_kicks import kick
 from beyond_mocap.throws.networks.example import example_of
 from beyond_mocap.throws.networks.limits import learn
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel

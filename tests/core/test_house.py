@@ -1,4 +1,5 @@
-"""The house keeps its walls (packaging/house.py has the plan): who may import whom, read from the source without running it."""
+"""The house keeps its walls (packaging/house.py has the plan): who may import whom, read from the source without
+running it."""
 
 import ast
 import pathlib
@@ -6,15 +7,29 @@ import re
 import sys
 import tomllib
 
-import draw_house
 import pytest
+
+import draw_house
 from house import (
-    BLENDER, CORE, LAYERS, MOST_FILES, TOP, count_side_by_side, file_graph, find_circles, is_below, list_sources,
-    may_import, parse_source, read_imports, room_of,
+    BLENDER,
+    CORE,
+    LAYERS,
+    MOST_FILES,
+    TOP,
+    count_side_by_side,
+    file_graph,
+    find_circles,
+    is_below,
+    list_sources,
+    may_import,
+    parse_source,
+    read_imports,
+    room_of,
 )
 
 ARRAYS = {"numpy", "scipy"}
 FORBIDDEN = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve"}
+PRODUCT = (CORE, "scene", "operators", "panels", "training", "packaging", "sample_blend", "benchmarks")
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc"}
 # What a room may import from outside beside numpy and scipy, and only inside the function that needs it.
 LAZY = {
@@ -164,14 +179,14 @@ def test_a_planted_offence_in_the_extension_is_seen(path, text):
 
 
 def test_there_are_no_drawers():
-    names = {part for path in list_sources(CORE, "scene", "operators", "panels", "training", "tests", "packaging", "sample_blend", "benchmarks")
+    names = {part for path in list_sources(*PRODUCT, "tests")
              for part in (*path.parts[:-1], path.stem)}
     assert names & DRAWERS == set()
 
 
 def test_nothing_is_unpickled_or_evaluated():
     offences = []
-    for path in list_sources(CORE, "scene", "operators", "panels", "training", "packaging", "sample_blend", "benchmarks"):
+    for path in list_sources(*PRODUCT):
         text = (TOP / path).read_text("utf-8")
         offences += [i.where for i in read_imports(path, text) if i.name.split(".")[0] in FORBIDDEN]
         for node in ast.walk(parse_source(text)):

@@ -6,7 +6,17 @@ import time
 import bpy
 import numpy as np
 from tab import (
-    PICTURES, assert_no_trouble_since, output, press, printed_since, room, run, sample, settings, settled, until,
+    PICTURES,
+    assert_no_trouble_since,
+    output,
+    press,
+    printed_since,
+    room,
+    run,
+    sample,
+    settings,
+    settled,
+    until,
     wait_for_work,
     window,
 )  # fmt: skip
@@ -69,7 +79,7 @@ def choose(*names):
 def shown_hits(body):
     """Whether an armature's strikes are found and their graph is there."""
     hits = thing(body).beyond_mocap_hits
-    return hits.found and room("scene.passes.graph").icon_of(hits)
+    return hits.found and room("scene.passes.settings").picture_icon(hits)
 
 
 def check_hit_analysis_shows_a_graph_and_goes_to_strikes():

@@ -10,9 +10,22 @@ import tomllib
 import addon_utils
 import bpy
 from tab import (
-    EXTENSION, PICTURES, TAB, assert_no_trouble_since, moves, output, press_all, press_button, printed_since, sample,
+    EXTENSION,
+    PICTURES,
+    TAB,
+    assert_no_trouble_since,
+    moves,
+    output,
+    press_all,
+    press_button,
+    printed_since,
+    sample,
     settings,
-    trouble, until, wait_for_work, window, within,
+    trouble,
+    until,
+    wait_for_work,
+    window,
+    within,
 )
 from window import unfold
 

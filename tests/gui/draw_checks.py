@@ -6,7 +6,6 @@ import bpy
 from tab import PICTURES, TAB, assert_no_trouble_since, output, room, run, sample, settings, settled, until, window
 
 
-
 def player():
     """The drawn player."""
     return settings().players["Drawn"]
@@ -40,7 +39,7 @@ def drawn():
     area = window.area("VIEW_3D")
     yield from window.open_tab(area, TAB)
     look_down(area)
-    run("beyond_mocap.synthesis.synthesize")
+    run("beyond_mocap.synthesize")
     yield from settled()
     yield from until(lambda: player().take)
 

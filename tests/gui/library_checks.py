@@ -8,7 +8,6 @@ from tab import PICTURES, TAB, moves, output, press, room, run, sample, settings
 from window import unfold
 
 
-
 def listing():
     """The list of clips."""
     return bpy.context.window_manager.beyond_mocap_clips

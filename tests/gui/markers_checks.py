@@ -6,7 +6,17 @@ import bpy
 import mathutils
 from ball_checks import choose, thing
 from tab import (
-    PICTURES, assert_no_trouble_since, output, press, room, run, sample, settled, until, wait_for_work, window,
+    PICTURES,
+    assert_no_trouble_since,
+    output,
+    press,
+    room,
+    run,
+    sample,
+    settled,
+    until,
+    wait_for_work,
+    window,
 )
 
 MARKERS = "BEYOND_MOCAP_PT_markers"

@@ -6,7 +6,18 @@ import time
 import bpy
 import numpy as np
 from tab import (
-    EXTENSION, PICTURES, assert_no_trouble_since, output, press, room, run, sample, settled, until, window, within,
+    EXTENSION,
+    PICTURES,
+    assert_no_trouble_since,
+    output,
+    press,
+    room,
+    run,
+    sample,
+    settled,
+    until,
+    window,
+    within,
 )
 
 

@@ -17,7 +17,8 @@ BEFORE = {}  # curve and body before the hand moved them
 
 def long_walk():
     """The sample's walk repeated on a straight line until it has 600 frames, as a BVH file."""
-    bvh, ride, line = room("beyond_mocap.files.bvh.bvh"), room("beyond_mocap.path_editing.ride"), room("beyond_mocap.path_editing.path_line")
+    bvh, ride = room("beyond_mocap.files.bvh.bvh"), room("beyond_mocap.path_editing.ride")
+    line = room("beyond_mocap.path_editing.path_line")
     clip = bvh.read(sample() / "library" / "walking_1_2.bvh", 0.01)
     wishes = ride.RideSettings(cycle=True, plant=False, lean=False)
     straight = line.through(np.array([[0.0, 0, 0], [40.0, 0, 0]]), "line")

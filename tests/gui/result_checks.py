@@ -8,7 +8,6 @@ import numpy as np
 from tab import EXTENSION, PICTURES, TAB, output, room, run, sample, settings, settled, until, window, within
 
 
-
 def work():
     """What runs just now."""
     return bpy.context.window_manager.beyond_mocap_work
@@ -72,10 +71,10 @@ def check_players_queue_and_each_has_its_own_step():
     yield from opened()
     settings().players[1].use = False
     with held() as hold:
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.2
         settings().players[0].use, settings().players[1].use = False, True
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield from until(lambda: work().waiting)
         assert work().waiting == settings().players[1].name and len(window.window.modal_operators) == 1
         window.picture(PICTURES / "result-queue.png")
@@ -114,7 +113,7 @@ def check_the_window_is_alive_while_takes_are_made():
 
     yield 1.0
     quiet, _ = yield from ticks(2.0)
-    run("beyond_mocap.synthesis.synthesize")
+    run("beyond_mocap.synthesize")
     yield 0.05
     begun = time.monotonic()
     busy, longest = yield from ticks(600.0)
@@ -127,19 +126,19 @@ def check_the_window_is_alive_while_takes_are_made():
 def check_escape_cancels_and_finish_early_keeps():
     yield from opened()
     with held():
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.5
         window.picture(PICTURES / "result-running.png")
         yield from window.move(900, 500)
         yield from window.press("ESC")
         yield from settled()
         assert states() == ["NONE", "NONE"]
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT", keep=True)
         yield from settled()
         assert states() == ["PREVIEW", "NONE"], states()
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.3
         run("beyond_mocap.cancel", "EXEC_DEFAULT")
         yield from settled()
@@ -154,7 +153,7 @@ def check_undo_in_the_middle():
     settings().alpha = 0.6
     run("ed.undo_push", "EXEC_DEFAULT", message="changed")
     with held() as hold:
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.4
         run("ed.undo")
         assert settings().alpha < 0.5
@@ -176,7 +175,7 @@ def check_keys_by_hand_and_what_is_out_of_date():
     """A pose keyed by I is told of within seconds, and is still there when the take was made anew."""
     yield from opened()
     settings().players[1].use = False
-    run("beyond_mocap.synthesis.synthesize")
+    run("beyond_mocap.synthesize")
     yield from settled()
     run("beyond_mocap.accept", "EXEC_DEFAULT", form="ACTION")
     body = settings().players[0].body
@@ -236,7 +235,7 @@ def check_whatever_happens_in_the_middle():
     """The player renamed or removed, its rig deleted, another scene shown, another file opened."""
     yield from opened()
     with held() as hold:
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.2
         settings().players[0].name = "Another name"
         settings().players.remove(1)
@@ -244,7 +243,7 @@ def check_whatever_happens_in_the_middle():
         yield from settled()
     assert states() == ["PREVIEW"] and settings().players[0].take
     with held() as hold:
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.2
         bpy.data.objects.remove(settings().players[0].body)
         hold.go()
@@ -253,7 +252,7 @@ def check_whatever_happens_in_the_middle():
     first = window.window.scene.name
     with held() as hold:
         take = settings().players[0].take
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.2
         window.window.scene = bpy.data.scenes.new("Elsewhere")
         hold.go()
@@ -263,7 +262,7 @@ def check_whatever_happens_in_the_middle():
         yield from settled()
         assert settings().players[0].take != take
     with held() as hold:
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 0.2
         bpy.ops.wm.open_mainfile(filepath=str(sample() / "quickstart.blend"))
         yield 0.5
@@ -288,7 +287,7 @@ def check_switched_off_while_takes_are_made_nothing_is_left_in_the_window():
     yield 1.0
     before = status_bar("before")
     with held():
-        run("beyond_mocap.synthesis.synthesize")
+        run("beyond_mocap.synthesize")
         yield 1.5
         assert not np.array_equal(status_bar("working"), before), "the status bar says nothing"
         run("preferences.addon_disable", "EXEC_DEFAULT", module=EXTENSION)
@@ -299,6 +298,6 @@ def check_switched_off_while_takes_are_made_nothing_is_left_in_the_window():
     run("preferences.addon_enable", "EXEC_DEFAULT", module=EXTENSION)
     yield from opened()
     assert not work().kind and not work().waiting
-    run("beyond_mocap.synthesis.synthesize")
+    run("beyond_mocap.synthesize")
     yield from settled()
     assert "PREVIEW" in states()

@@ -9,7 +9,6 @@ from mathutils import Euler
 from tab import EXTENSION, PICTURES, TAB, moves, output, press_button, sample, settled, until, window
 
 
-
 def room(name):
     """A module of the extension."""
     return importlib.import_module(f"{EXTENSION}.scene.{name}")

@@ -93,7 +93,8 @@ is."""
     manager = bpy.context.window_manager
     busy = [operator.bl_idname for operator in window.window.modal_operators]
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
-    busy += [f"scene.{name}.live" for name in ("ride", "aimed", "passes") if room(f"scene.{name}.live").WATCHER.dirty]
+    live = [f"scene.{name}.live" for name in ("path_editing", "ball", "passes")]
+    busy += [name for name in live if room(name).WATCHER.dirty]
     busy += ["scene.result.live"] if settings().live and room("scene.result.live").WATCHER.dirty else []
     thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
     busy += ["scene.throws.live"] if thrown and room("scene.throws.live").WATCHER.dirty else []

@@ -4,7 +4,6 @@ import bpy
 from tab import PICTURES, TAB, operator_of, press, room, sample, settled, until, window
 
 
-
 def nla():
     """The NLA editor."""
     return window.area("NLA_EDITOR")

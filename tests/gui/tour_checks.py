@@ -12,7 +12,6 @@ sys.path.insert(0, str(pathlib.Path("tests/blender").resolve()))
 from undo import state  # noqa: E402
 
 
-
 def the_file():
     """All that the file holds, without what undo leaves alone: the frame shown and what is selected."""
     found = state()

@@ -6,7 +6,6 @@ import pytest
 
 from beyond_mocap.cli.main import main
 from beyond_mocap.throws.planted_examples import write_planted
-
 from tests.core.throws.test_throw import STICK
 
 

@@ -14,9 +14,8 @@ import pytest
 
 from beyond_mocap.base.errors import Cancelled, InputError
 from training import checkpoint
-from training.fit import batches, stretches
 from training.config import config_of
-from training.fit import fit, rate_at
+from training.fit import batches, fit, rate_at, stretches
 
 TOP = Path(__file__).resolve().parents[2]
 CONFIG = config_of({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})

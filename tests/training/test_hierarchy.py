@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.network_npz import read_model, write_model
 from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.network_npz import read_model, write_model
 from beyond_mocap.throws.networks.example import describe, example_of, poses
 from beyond_mocap.throws.networks.frame_step import Stepper
 from beyond_mocap.throws.networks.limits import JointLimits, learn

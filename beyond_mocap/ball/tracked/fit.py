@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.easing import hermite
-from ...base.vectors import unit_vectors
 from ...base.errors import Cancelled
+from ...base.vectors import unit_vectors
 from ..batch import courses
 from ..physics import FOOTBALL, Ball
 from .coarse import coarse_courses
@@ -90,10 +90,9 @@ def gathered(times, positions, measured, used, spans) -> Stretches:
     weight = np.where(measured[index], 1.0 / _SEEN, 1.0 / _FILLED) * (inside & used[index])
     high = np.isfinite(points[..., 2])
     weight_z = np.where(measured[index], 1.0 / _SEEN_HEIGHT, 1.0 / _FILLED) * (inside & used[index] & high)
-    return Stretches(
-        ends - begins, *(np.array([span[place] for span in spans]) for place in (2, 3, 4)),
-        np.where(inside, times[index] - begins[:, None], 0.0), np.nan_to_num(points), weight, weight_z,
-    )  # fmt: skip
+    start, end, velocity = (np.array([span[place] for span in spans]) for place in (2, 3, 4))
+    since = np.where(inside, times[index] - begins[:, None], 0.0)
+    return Stretches(ends - begins, start, end, velocity, since, np.nan_to_num(points), weight, weight_z)
 
 
 def fit_launches(

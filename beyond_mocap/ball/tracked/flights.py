@@ -103,7 +103,7 @@ def _between(pieces: list[BallPiece], moments: np.ndarray) -> list[list[BallPiec
 def _worth(group: list[BallPiece]) -> bool:
     seconds = group[-1].end - group[0].start
     way = sum(np.linalg.norm(piece.positions[-1, :2] - piece.positions[0, :2]) for piece in group)
-    return _SHORTEST <= seconds <= LONGEST and way >= _LEAST_WAY
+    return bool(_SHORTEST <= seconds <= LONGEST and way >= _LEAST_WAY)
 
 
 def _ends(group: list[BallPiece]) -> tuple[np.ndarray, np.ndarray]:
@@ -124,7 +124,8 @@ def _heights(samples: Samples, heights: bool) -> np.ndarray:
 def _followed(stretches: Stretches, launches, spans) -> tuple[list[BallPiece], list[tuple]]:
     """The flights as pieces, and how far each is off: root mean squares over the ground and in height of
     measured samples, of filled ones, and the end, m."""
-    found, offs = [None] * len(spans), [None] * len(spans)
+    found: list[BallPiece] = [None] * len(spans)
+    offs: list[tuple] = [None] * len(spans)
     order = np.argsort(stretches.seconds, kind="stable")
     for low in range(0, len(order), 64):
         some = order[low : low + 64]

@@ -72,8 +72,10 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     filled = _filled(ball[:, :2], known, interval)
     scatter = _scatter(ball[:, :2], interval)
     outlier = _outliers(times, ball[:, :2], known, scatter)
-    flags = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
-    return Samples(frozen_array(times), frozen_array(_centred(ball)), *flags, frozen_array(scatter), interval)
+    known, filled, outlier = (frozen_array(flag, bool) for flag in (known, filled & known, outlier))
+    return Samples(
+        frozen_array(times), frozen_array(_centred(ball)), known, filled, outlier, frozen_array(scatter), interval
+    )
 
 
 def _centred(ball: np.ndarray) -> np.ndarray:

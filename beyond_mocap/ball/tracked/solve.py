@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.time_series import interpolate
 from ...base.errors import Cancelled, InputError
+from ...base.time_series import interpolate
 from ...motion.skeleton import frozen_array
 from ...motion.track import BALL_RADIUS
 from . import cuts as cutting

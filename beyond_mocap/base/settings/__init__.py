@@ -7,6 +7,7 @@ Files and objects that a command reads or writes, lists, and what a panel only k
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from . import aim, library, markers, match, passes, path_editing, stream, study, synthesis, throws, view
 from .setting import Setting
@@ -33,6 +34,6 @@ def setting(group: str, name: str) -> Setting:
     return next(row for row in TABLES[group] if row.name == name)
 
 
-def defaults(*groups: str) -> dict[str, object]:
+def defaults(*groups: str) -> dict[str, Any]:
     """The defaults of groups of settings, by name."""
     return {row.name: row.default for group in groups for row in TABLES[group]}

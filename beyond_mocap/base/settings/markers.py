@@ -87,6 +87,6 @@ TABLES = {
         Setting(name="size", default=0.007, least=0.0, unit="metres", tooltip="Radius of the spheres at the markers",
             panel_more=dict(soft_max=0.05, unit="LENGTH")),
     ),
-    "markers.model.model": (Setting(name="use_model", default=False, tooltip="Take joints and markers from the model instead "
+    "markers.model": (Setting(name="use_model", default=False, tooltip="Take joints and markers from the model instead "
         "of finding them anew"),),
 }

@@ -14,7 +14,7 @@ TABLES = {
         Setting(name="players", default=(), option="--players", metavar="ID", help="only these, by id; default: "
             "everybody", option_more=dict(nargs="+")),
     ),
-    "match.pieces.work": (
+    "match.work": (
         Setting(name="workers", kind=int, least=1, most=256, option="--workers", metavar="N", help="processes on this "
             "machine; default: one per core", title="Processes", tooltip="How many work at once, beside Blender; 0: "
             "one for each processor core", panel_more=dict(default=0, min=0)),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 from functools import partial
+from typing import Any
 
 from . import rows_of
 from .setting import Setting, collect
@@ -18,7 +19,7 @@ def add_options(parser, group: str, *names: str) -> None:
             parser.add_argument(*row.option.split(), **_arguments(row))
 
 
-def option_values(record: type, options: argparse.Namespace, *groups: str) -> dict[str, object]:
+def option_values(record: type, options: argparse.Namespace, *groups: str) -> dict[str, Any]:
     """What the command line says about fields of the dataclass `record`, in groups of settings."""
     rows = [row for group in groups for row in rows_of(group) if row.option]
     return collect(record, rows, lambda row: getattr(options, row.name))

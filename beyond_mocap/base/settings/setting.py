@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from typing import Any
 
 from ..errors import InputError
 
 BETWEEN = "between {least} and {most}"
 WHOLE = "a whole number from {least} to {most}"
-POSITIVE = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
+POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,7 +35,7 @@ class Setting:
     """
 
     name: str
-    default: object = None
+    default: Any = None
     kind: type | None = None
     least: float | None = None
     most: float | None = None
@@ -82,7 +83,7 @@ class Setting:
         return self.convert(found) if self.convert else found
 
 
-def check_limits(record: object, rows: Iterable[Setting]) -> None:
+def check_limits(record: Any, rows: Iterable[Setting]) -> None:
     """Raises InputError where a number of the dataclass `record` is outside the limits that `rows` have for it; where
     the default is outside them too, the record checks for itself."""
     names = {one.name for one in fields(record)}
@@ -93,7 +94,7 @@ def check_limits(record: object, rows: Iterable[Setting]) -> None:
                 raise InputError(row.name, f"{value:g}", f"{row.least:g} to {row.most:g}")
 
 
-def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], object]) -> dict[str, object]:
+def collect(record: type, rows: Iterable[Setting], said: Callable[[Setting], object]) -> dict[str, Any]:
     """The values of those fields of the dataclass `record` that `rows` have; `said` finds what the user said.
     What is not set is left out."""
     names = {one.name for one in fields(record)}

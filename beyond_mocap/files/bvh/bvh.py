@@ -20,13 +20,13 @@ from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, heading
 from ...motion.motion import Motion
-from ...motion.skeleton import Skeleton
 from ...motion.retargeting.structure import below
+from ...motion.skeleton import Skeleton
+from ..whole import beside
 from . import bvh_scale, bvh_text
 from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS, BvhText
 from .bvh_write import document
-from ..whole import beside
 
 _STILL_METRES = 1e-3  # what moves less is written as still
 _STILL_ROTATION = np.cos(np.radians(0.1) / 2)  # w of a turn by a tenth of a degree
@@ -179,7 +179,8 @@ def _skeleton(channels: _Channels, kept: list[int]) -> tuple[Skeleton, dict[str,
     ends = [(new[p], offset) for p, offset in zip(text.end_parents, text.end_offsets) if p in new]
     end_offsets = bvh_scale.to_ours(np.array([offset for _, offset in ends]).reshape(-1, 3), channels.scale.up)
     names = tuple(text.names[joint] for joint in kept)
-    return Skeleton(names, parents, offsets, [p for p, _ in ends], end_offsets * channels.scale.unit), drift
+    end_parents = tuple(parent for parent, _ in ends)
+    return Skeleton(names, tuple(parents), np.array(offsets), end_parents, end_offsets * channels.scale.unit), drift
 
 
 def _check_size(text: BvhText, root: np.ndarray, skeleton: Skeleton) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.vectors import unit_vectors
 from ...base.errors import InputError
+from ...base.vectors import unit_vectors
 from ...motion.humanoid import Humanoid, identify, leg_length
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton

@@ -34,7 +34,7 @@ class MatchEvent:
     details: tuple[str, ...] = ()
     said: str = ""
     success: bool | None = None
-    place: tuple[float, float] = (float("nan"), float("nan"))
+    place: tuple[float, ...] = (float("nan"), float("nan"))
 
     @property
     def played(self) -> bool:

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...base.errors import InputError
-from .event_tables import read_metrica_events, read_plain_events
 from ..tracking.feed import Provider, find_provider, load_through_kloppy, read_head
+from .event_tables import read_metrica_events, read_plain_events
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,16 +1,17 @@
-"""Events in tables: our own, of which docs/match/match-input.md names the columns, and Metrica's, which kloppy leaves out."""
+"""Events in tables: our own, of which docs/match/match-input.md names the columns, and Metrica's, which kloppy leaves
+out."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from ...annotation.event_words import KINDS
-from ...base.errors import InputError
 from ...annotation.striking import BODY_PARTS
-from .event_data import MatchEvent
-from .event_players import Who
+from ...base.errors import InputError
 from ...motion.track.match_data import Match
 from ..tables import number, read_rows
+from .event_data import MatchEvent
+from .event_players import Who
 
 _USUAL_PITCH = (105.0, 68.0)
 _TABLE_KINDS = {  # of plain tables -> kind

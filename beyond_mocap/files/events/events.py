@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
+from ...motion.track.match_data import Match
+from ..tracking.match_repairs import home_end
 from .event_data import MatchEvent, MatchEvents
 from .event_kinds import kind_of
 from .event_players import Who, same_players
 from .event_providers import EVENT_PROVIDERS, EventProvider, guessed_event_provider, load_events, other_file
 from .event_tables import pitch_size
-from ...motion.track.match_data import Match
-from ..tracking.match_repairs import home_end
 
 _LEAST_KNOWN = 0.5  # share of the events' players who must be in the tracking
 

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from ...base.errors import InputError
 
@@ -104,13 +105,16 @@ def read_head(path: Path) -> bytes:
         return file.read(_HEAD).removeprefix(b"\xef\xbb\xbf")
 
 
-def find_provider(path: Path, providers: Mapping[str, Provider]) -> Provider | None:
+Known = TypeVar("Known", bound=Provider)
+
+
+def find_provider(path: Path, providers: Mapping[str, Known]) -> Known | None:
     """The provider whose form a file has; None where it is none that is known."""
     head = read_head(path)
     return next((one for one in providers.values() if any(re.match(form, head) for form in one.patterns)), None)
 
 
-def load_through_kloppy(path: Path, provider: str, loader: str, arguments: dict[str, object], form: str, others: str):
+def load_through_kloppy(path: Path, provider: str, loader: str, arguments: Mapping, form: str, others: str):
     """kloppy's dataset. path, form, others: for messages: the file, what it should be, and what belongs to it.
     InputError where kloppy is not installed or cannot read the files."""
     try:

@@ -100,7 +100,7 @@ def _find_beside(meta: Path, word: str, path: Path, notes: list[str]) -> Path:
 
 def _find_number(pattern: bytes, content: bytes) -> str | None:
     found = re.search(pattern, content)
-    return found and found[1].decode("utf-8", "replace")
+    return found[1].decode("utf-8", "replace") if found else None
 
 
 _find_sportec_number = partial(_find_number, rb'MatchId="([^"]{1,60})"')

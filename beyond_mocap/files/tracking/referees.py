@@ -7,8 +7,8 @@ import re
 
 import numpy as np
 
-from .feed import Feed, Samples
 from ...motion.track.match_data import REFEREE
+from .feed import Feed, Samples
 
 _TRACAB_CODE = 3
 _TRACAB = re.compile(rb"[;:]3,(-?\d+),(-?\d+),(-?\d+\.?\d*),(-?\d+\.?\d*),")

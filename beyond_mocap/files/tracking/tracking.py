@@ -16,16 +16,16 @@ import numpy as np
 from ...base.errors import InputError
 from ...motion.skeleton import frozen_array
 from ...motion.track import Track
+from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
+from ..tables import number, read_rows
+from ..whole import atomic_write
 from . import match_arrays
 from .feed import Feed
 from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
-from ...motion.track.match_data import REFEREE, Match, MatchPlayer, Team, presence_lines
 from .match_repairs import mended_ball, mended_players, mended_sides, side_lines
 from .providers import find_feed, load_tracking
 from .referees import described_referee, referee_samples
-from ..tables import number, read_rows
 from .team_colours import team_colours
-from ..whole import atomic_write
 
 RATES = (5.0, 100.0)
 """Samples per second that a track may have."""

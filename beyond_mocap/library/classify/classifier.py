@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
-from ...motion.motion import Motion
 from ...base.runs import runs
+from ...motion.motion import Motion
 from ..proposal import LEARNED, Proposal
 from . import confidence
 from .act import Act, candidates, in_space, rule_at, rule_sure, steady, struck

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..proposal import Proposal
 from ...annotation.labels import GROUPS, list_labels
+from ..proposal import Proposal
 
 EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
 """Words of which an act has one at most; any other word is there or not."""

@@ -182,7 +182,7 @@ def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple
     """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that had not seen their
     clips."""
     names = list(dict.fromkeys(side.example.name for side in sides))
-    parts = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
+    parts: list[tuple[np.ndarray, ...]] = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
     for fold in range(min(_FOLDS, len(names))):
         out = set(names[fold::_FOLDS])
         looks = _kernel(word, moment, [side for side in sides if side.example.name not in out])

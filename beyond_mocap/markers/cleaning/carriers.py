@@ -12,8 +12,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .cluster_shape import Shape, distance_spread, mean_shape
 from ..frames import RigidFit, rigid_fit, taken_back
+from .cluster_shape import Shape, distance_spread, mean_shape
 from .robust import median
 
 _MOST_HELPERS = 5

@@ -14,13 +14,13 @@ import numpy as np
 
 from ...base.errors import Cancelled, InputError
 from ...base.runs import runs
+from ..trial import MarkerTrial
 from .carriers import carriers, softness
 from .clean_report import CleanReport, Stretch
 from .gaps import Longest, fill
 from .jumps import take_out
 from .pieces import leaps
 from .swaps import mend, there_and_back
-from ..trial import MarkerTrial
 from .unlabeled import assign, unlabeled
 
 # a marker this much farther from its place than its tolerance for this long is told, s

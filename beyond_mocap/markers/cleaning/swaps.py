@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.runs import runs
-from .carriers import Carried
 from ..frames import placed, rigid_fit
+from .carriers import Carried
 from .robust import median
 
 # exchanging must bring the deformation down to this part of it and by this much, m

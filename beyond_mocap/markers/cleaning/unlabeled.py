@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .carriers import Carried
 from ..model.marker_set import UNLABELED
+from .carriers import Carried
 from .pieces import Piece, leaps, pieces
 
 # a piece this short tells nothing, s

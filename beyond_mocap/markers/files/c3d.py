@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from ...files.content import opened
+from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from .raw_markers import RawMarkers, as_trial
 
 BLOCK = 512
@@ -191,7 +191,10 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
     if not (any(counts["points"]) and counts["data"] and counts["frames"]):
         raise InputError(path, f"{header.point_count} markers, {max(counts['frames'], default=0)} frames", "markers",
                          "export the trial with its markers")  # fmt: skip
-    layouts = [_Layout(*each, scale, first, ()) for each in itertools.product(*counts.values()) if each[1]]
+    layouts = [
+        _Layout(data, points, analog, count, scale, first, ())
+        for data, points, analog, count in itertools.product(*counts.values()) if points
+    ]
     left = [size - layout.data - layout.frames * layout.stride for layout in layouts]
     fitting = [i for i, rest in enumerate(left) if 0 <= rest < BLOCK] or [i for i, rest in enumerate(left) if rest >= 0]
     if not fitting:
@@ -241,7 +244,7 @@ def _frames(parameters: _Parameters) -> tuple[int, list[int]]:
     return first, list(dict.fromkeys(count for count in said if count > 0))
 
 
-def _words(path: Path, handle, layout: _Layout) -> bytes | np.ndarray:
+def _words(path: Path, handle, layout: _Layout) -> np.ndarray:
     """(T, bytes of a frame's points) uint8."""
     handle.seek(layout.data)
     points = 4 * layout.points * layout.word

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 from ...base.errors import InputError
+from ...files.content import utf8
 from ..model.landmarks import LANDMARKS
 from ..model.marker_set import MarkerSet
 from ..model.template import JOINTS
-from ...files.content import utf8
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
 LARGEST = 1_000_000
@@ -52,9 +53,9 @@ def parse_marker_set(text: str, name: str = "marker set") -> MarkerSet:
         raise InputError(name, "no line `marker set: NAME`", "the name of the set", _FORM)
     if not read.segments:
         raise InputError(name, "no segment", "a line such as `segment Hips: LASI, RASI, SACR`", _FORM)
+    lists: dict[str, Any] = {key: tuple(labels) for key, labels in read.lists.items()}
     try:
-        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about,
-                         **{key: tuple(labels) for key, labels in read.lists.items()})  # fmt: skip
+        return MarkerSet(read.name, read.segments, read.landmarks, read.aliases, about=read.about, **lists)
     except InputError as error:
         raise InputError(name, str(error)) from None
 

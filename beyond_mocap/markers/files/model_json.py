@@ -9,12 +9,12 @@ import os
 import numpy as np
 
 from ...base.errors import InputError
-from ..model.model import BallMarker, Freedom, MarkerModel
-from ..trial import repeated
-from ...motion.skeleton import Skeleton
 from ...files.content import utf8
 from ...files.json_values import check_names, entries, number, numbers, object_of, text, truth
 from ...files.whole import atomic_write
+from ...motion.skeleton import Skeleton
+from ..model.model import BallMarker, Freedom, MarkerModel
+from ..trial import repeated
 
 VERSION = 1
 LARGEST = 10_000_000

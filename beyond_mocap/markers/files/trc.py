@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from ...files.content import content
+from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from .raw_markers import RawMarkers, as_trial
 
 _MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..trial import MarkerTrial
 from ...files.whole import atomic_write
+from ..trial import MarkerTrial
 
 _PLACE = "%.4f\t%.4f\t%.4f"
 

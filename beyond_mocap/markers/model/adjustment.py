@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.vectors import skew_matrix
-from ...motion.motion import Motion
 from ...motion import quaternion
+from ...motion.motion import Motion
 
 _HUBER = 2.5  # sigmas beyond which a marker counts less
 _HINGES = {"Leg": (1, 2, 0), "ForeArm": (2, 1, None)}  # axis of the bend, axis that must stay square to it, its twist

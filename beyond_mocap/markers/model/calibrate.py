@@ -17,22 +17,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.errors import Cancelled, InputError
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.motion import Motion, forward_kinematics
+from ..frames import rigid_fit
+from ..pose.chain import chain
+from ..pose.pose import PoseSettings, Solved, solve
+from ..pose.residuals import seen_markers
+from ..pose.weights import cluster_deviation, edge_deviation
+from ..trial import MarkerTrial
 from .adjustment import Adjustment, Body, Prior, Pull
 from .assemble import SIGMA, model_from_frame
-from ..pose.chain import chain
-from ..frames import rigid_fit
 from .joint_freedom import freedom_of
 from .marker_set import MarkerSet
 from .model import MarkerModel
-from ..pose.pose import PoseSettings, Solved, solve
-from ..pose.residuals import seen_markers
 from .static import static_frame
-from ..trial import MarkerTrial
-from ..pose.weights import cluster_deviation, edge_deviation
 
 FRAMES = 60
 _STATIC_FRAMES = 4

@@ -16,8 +16,8 @@ from functools import partial
 
 import numpy as np
 
-from ...base.vectors import unit_vector
 from ...base.errors import InputError
+from ...base.vectors import unit_vector
 from ...motion import quaternion
 from ..frames import mean_rotation, rigid_fit
 from .template import LANDMARK_PLACES, PLACES, TIPS

@@ -12,10 +12,10 @@ import numpy as np
 
 from ...base.errors import InputError
 from ..cleaning.cluster_shape import mean_shape
-from ..frames import RigidFit, mean_rotation, placed, rigid_fit, taken_back
 from ..cleaning.robust import medians, quantile
-from .template import PARENTS
+from ..frames import RigidFit, mean_rotation, placed, rigid_fit, taken_back
 from ..trial import MarkerTrial
+from .template import PARENTS
 
 # nobody who stands still moves faster than this, m/s (median of the markers over a second)
 _STILL = 0.1

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.settings import setting
 from ...base.errors import InputError
+from ...base.settings import setting
 from ...motion import quaternion
 from ...motion.motion import Motion
 

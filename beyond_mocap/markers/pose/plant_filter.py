@@ -17,10 +17,10 @@ import numpy as np
 
 from ...base.easing import smoothstep
 from ...base.errors import InputError
+from ...base.runs import runs
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import Motion, pose_kinematics
-from ...base.runs import runs
 from ...motion.reach import bent_limb
 
 WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01

@@ -14,10 +14,11 @@ import numpy as np
 from ...base.errors import Cancelled, InputError
 from ...motion import quaternion
 from ...motion.motion import Motion
+from ..frames import placed as carried
+from ..frames import rigid_fit
 from . import weights as marker_weights
 from .chain import Chain, Poses, chain, place, poses
 from .descent import HeldPoint, Task, descend
-from ..frames import placed as carried, rigid_fit
 from .residuals import seen_markers
 from .smooth import smooth
 from .start import first_poses

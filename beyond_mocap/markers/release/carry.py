@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.easing import smoothstep
 from ...ball.flight import Launch, fly
 from ...ball.physics import Ball
+from ...base.easing import smoothstep
 from ...motion.hand import Hand
 
 _SETTLES = 0.10  # s before the release from which on the ball moves from its usual place to where it leaves

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...motion.hand import Hand
 from ..frames import rigid_fit
 from ..trial import MarkerTrial
-from ...motion.hand import Hand
 
 NEAR = 0.14
 """m from the wrist within which a marker belongs to the hand."""

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.time_series import interpolate
 from ...ball.physics import Ball, in_air
+from ...base.time_series import interpolate
 
 FASTEST_SPIN = 2.0 * np.pi * 50.0
 """rad/s: 3000 turns a minute, the most that pitched baseballs have."""

@@ -14,23 +14,22 @@ import numpy as np
 
 from ...ball.flight import Launch, fly
 from ...ball.physics import THROWN, Ball
-from ...base.settings import setting
-from .carry import carried_and_thrown
-from .first_guess import by_distance, fastest, speeds
-from ...motion.hand import Hand, hand_of
-from .hand_markers import sharpened
-from .hand_ball import HandBall, ball_in_hand
-from ...motion.hand import usual_centre
-from .launch_fit import Held, fit_launch
-from .radar import radar_speed
-from .without_ball import HOLD, release_by_hand
 from ...base.errors import InputError
-from ..frame_times import evenly
-from ..trial import MarkerTrial
+from ...base.settings import setting
 from ...motion.contacts import ground_height
+from ...motion.hand import Hand, hand_of, usual_centre
 from ...motion.humanoid import identify
 from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
+from ..frame_times import evenly
+from ..trial import MarkerTrial
+from .carry import carried_and_thrown
+from .first_guess import by_distance, fastest, speeds
+from .hand_ball import HandBall, ball_in_hand
+from .hand_markers import sharpened
+from .launch_fit import Held, fit_launch
+from .radar import radar_speed
+from .without_ball import HOLD, release_by_hand
 
 FEWEST = 12
 """Frames without which no throw is looked for."""

@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.time_series import interpolate
-from .first_guess import fastest
 from ...motion.hand import Hand
+from .first_guess import fastest
 
 SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""

@@ -8,7 +8,15 @@ from pathlib import Path
 import numpy as np
 
 from ...evaluation.html_page import (
-    Html, build_image, build_number_cell, build_page, build_row, build_section, build_table, build_title, element,
+    Html,
+    build_image,
+    build_number_cell,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    build_title,
+    element,
     fragment,
 )
 from . import pictures

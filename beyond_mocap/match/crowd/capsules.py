@@ -2,8 +2,8 @@
 
 A capsule is all that lies within its radius of a straight line. The overlap of two bodies is the largest, over all
 pairs of a capsule of the one and a capsule of the other, of the sum of both radii less the distance of both lines;
-negative where they are apart. The radii are those of the low-poly body (`appearance.body`), the wide trunk as three lines
-(across the hips, up the spine, across the shoulders).
+negative where they are apart. The radii are those of the low-poly body (`appearance.body`), the wide trunk as three
+lines (across the hips, up the spine, across the shoulders).
 """
 
 from __future__ import annotations
@@ -124,7 +124,7 @@ class Touching:
         return Touching(*(getattr(self, field.name)[kept] for field in fields(self)))
 
 
-def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, np.ndarray], least: float = 0.0) -> Touching:
+def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], least: float = 0.0) -> Touching:
     """Where two bodies' capsules are at least `least` metres deep in each other.
 
     one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m.

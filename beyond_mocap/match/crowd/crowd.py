@@ -15,8 +15,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...motion.motion import Motion
 from ...base.runs import runs
+from ...motion.motion import Motion
 from .capsules import FAR, capsules, lines, touching
 from .correction import CURVES, Correction, carried
 from .crowd_body import CrowdBody, moved
@@ -73,8 +73,8 @@ def overlap_depths(motions: Sequence[Motion], firsts: Sequence[int]) -> list[np.
     bodies, start = _on_one_clock(motions, [np.zeros((len(motion), 2), bool) for motion in motions], firsts, None)
     deepest = [np.zeros(len(body.lines)) for body in bodies]
     for one, other, frames in _near_pairs([body.lines for body in bodies]):
-        pair = bodies[one], bodies[other]
-        found = touching(*(body.lines[frames] for body in pair), tuple(body.radii for body in pair))
+        mine, its = bodies[one], bodies[other]
+        found = touching(mine.lines[frames], its.lines[frames], (mine.radii, its.radii))
         for number in (one, other):
             np.maximum.at(deepest[number], frames[found.frame], found.depth)
     return [own[first - start :][: len(motion)] for own, first, motion in zip(deepest, firsts, motions)]

@@ -8,20 +8,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...annotation.ball_contact import surfaces
 from ...library.features import FPS
 from ...library.library import Library
-from ...annotation.ball_contact import surfaces
 from ...motion.motion import Motion
-from .correction import CURVES, Correction, applied
-from .spacing import keeping
 from ...synthesis.take import Take
-from .restore_ball_contact import at_ball
-from .crowd import kept_apart, overlap_depths
-from ..pieces.cut_plan import cut_plan
 from ..expand import expanded
 from ..match_ball import course, led_by, met
+from ..pieces.cut_plan import cut_plan
 from ..pieces.named_edit import part
 from ..player_edit import PlayerEdit, Stretch
+from .correction import CURVES, Correction, applied
+from .crowd import kept_apart, overlap_depths
+from .restore_ball_contact import at_ball
+from .spacing import keeping
 
 LONGEST = 60.0
 """Seconds of a window at most: everybody's motion in it is in memory at once."""

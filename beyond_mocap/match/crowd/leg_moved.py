@@ -32,7 +32,7 @@ def leg_moved(
     """
     hip, knee, ankle = (places[:, joint] for joint in (limb.upper_leg, limb.lower_leg, limb.foot))
     thigh, shin, line = knee - hip, ankle - knee, ankle - hip
-    lengths, goal = [np.linalg.norm(bone, axis=1) for bone in (thigh, shin)], line + shift
+    lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift
     own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
     eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
     reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])

@@ -66,7 +66,8 @@ def pushed(
 
 def _near_frames(bodies, placed, pair: tuple[int, int]) -> np.ndarray:
     """The frames at which two bodies are within _CLOSE of each other, and _AROUND before and behind."""
-    found = touching(*(placed[body] for body in pair), tuple(bodies[body].radii for body in pair), -_CLOSE).frame
+    one, other = pair
+    found = touching(placed[one], placed[other], (bodies[one].radii, bodies[other].radii), -_CLOSE).frame
     near = np.zeros(len(placed[pair[0]]) + 2 * _AROUND, bool)
     for step in range(2 * _AROUND + 1):
         near[found + step] = True
@@ -79,7 +80,7 @@ def _contacts(bodies, placed, pairs, near, pressures, first: int, fps: float) ->
     for (one, other), frames, pressure in zip(pairs, near, pressures):
         two = placed[one], placed[other]
         radii = bodies[one].radii, bodies[other].radii
-        found = touching(*(ends[frames] for ends in two), radii, ALLOWED - ROOM)
+        found = touching(two[0][frames], two[1][frames], radii, ALLOWED - ROOM)
         found = replace(found, frame=frames[found.frame])
         found, way, give = _pressing(found, two, pressure, first, fps)
         for body, against, sign in ((one, other, 1.0), (other, one, -1.0)):

@@ -9,14 +9,15 @@ from dataclasses import replace
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
-from ...motion.motion import Motion, pose_kinematics
 from ...annotation.striking import ball_gap
+from ...motion.motion import Motion, pose_kinematics
 from ...motion.track import BALL_RADIUS
 from ...synthesis.construct.ball.strike_at import Meeting, met_at
 from ...synthesis.take import KeyResult, Take
 
 CLOSED = 0.15
-"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more plays as he does."""
+"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more
+plays as he does."""
 
 OPEN = 1e-3
 """Metres of gap that are left."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.banded_least_squares import BandedLeastSquares
 from ...base.arctangent import arctan2
+from ...base.banded_least_squares import BandedLeastSquares
 from ...base.runs import runs
 from ...motion.track import zero_phase_hann
 from .episodes import Episode, episodes

@@ -166,7 +166,8 @@ def _clock(events, since, touches, start: float, span) -> PeriodClock | None:
     near = rest[np.abs(rest) < 3.0 * _SPREAD]
     spread = 1.48 * float(np.median(np.abs(near - np.median(near)))) if len(near) else np.nan
     matched, chance = right[0, 0] / right[0, 1], wrong[0, 0] / max(wrong[0, 1], 1)
-    sure = _sure(*right[0], chance) + _DOUBTFUL * _sure(*right[1], wrong[1, 0] / max(wrong[1, 1], 1)) - _far(lag)
+    doubtful = _sure(right[1, 0], right[1, 1], wrong[1, 0] / max(wrong[1, 1], 1))
+    sure = _sure(right[0, 0], right[0, 1], chance) + _DOUBTFUL * doubtful - _far(lag)
     return PeriodClock(float(lag), float(drift), spread, float(matched), float(chance), int(right[0, 1]), float(sure))
 
 

@@ -29,7 +29,7 @@ def named(library: Library, edit: EditList, moments: Sequence[KeyMoment]) -> Nam
     row = {int(clip): number for number, clip in enumerate(used)}
     clips = tuple((library.clips[clip].path, library.clips[clip].mirrored) for clip in used)
     keys = [_named_key(placed, row, moments[placed.wanted].time) for placed in edit.keys]
-    clip = [row[int(clip)] for clip in edit.clip[starts]]
+    clip = np.array([row[int(clip)] for clip in edit.clip[starts]], int)
     cut = np.isin(starts, edit.seams) | (starts == 0)
     return NamedEdit(clips, clip, local[starts], rate, length, cut, tuple(sorted(keys, key=lambda key: key.time)))
 

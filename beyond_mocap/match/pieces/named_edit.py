@@ -80,8 +80,9 @@ def part(edit: NamedEdit, low: int, high: int) -> NamedEdit:
     kept = end > begin
     first = edit.first + edit.rate * (begin - starts)
     cut = np.where(begin == low, True, edit.cut)
-    rows = (values[kept] for values in (edit.clip, first, edit.rate, end - begin, cut))
-    return NamedEdit(edit.clips, *rows, edit.keys)
+    return NamedEdit(
+        edit.clips, edit.clip[kept], first[kept], edit.rate[kept], (end - begin)[kept], cut[kept], edit.keys
+    )
 
 
 def chained(parts: Sequence[NamedEdit], keys: Sequence[NamedKey]) -> NamedEdit:

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
 from typing import NoReturn
@@ -102,7 +102,7 @@ def run(
         yield from _told(_spread(iter(tasks), work, _Processes(place.workers), stop), spent)
 
 
-def _told(done: Iterator[tuple[object, Done]], spent) -> Iterator[tuple[object, object]]:
+def _told(done: Generator[tuple[object, Done], None, None], spent) -> Iterator[tuple[object, object]]:
     with contextlib.closing(done):
         for key, one in done:
             if spent is not None:
@@ -134,14 +134,14 @@ def peak_memory() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1024.0)
 
 
-def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Iterator[tuple[object, Done]]:
+def _here(tasks: Iterable[Task], work: Work, stop: Callable[[], bool]) -> Generator[tuple[object, Done], None, None]:
     for key, arguments in tasks:
         if stop():
             raise Cancelled("cancelled")
         yield key, attempt(work, arguments)
 
 
-def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Iterator[tuple[object, Done]]:
+def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[object, Done], None, None]:
     """The loop over one place's workers: keeps them busy, hands on what is done, and does again what was lost.
 
     After a break all that was in hand is done again; after several the pieces go one by one, so that the one that ends
@@ -249,7 +249,7 @@ class _Processes:
     def _end(self) -> None:
         executor, self._executor = self._executor, None
         if executor is not None:
-            executor.shutdown(wait=True, kill_workers=True)
+            executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
 
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
@@ -272,7 +272,7 @@ def ended() -> None:
     """Ends the local processes that wait for more work."""
     executor, _Processes.started = _Processes.started, None
     if executor is not None:
-        executor.shutdown(wait=True, kill_workers=True)
+        executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
 
 
 class _Cluster:

@@ -17,10 +17,10 @@ from ...synthesis.search.balance import balanced
 from ...synthesis.search.path_costs import PathCosts
 from ...synthesis.search.slots import AROUND
 from ...synthesis.search.wanted import build_order
+from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
 from .cut_plan import cut_plan
 from .library_clips import bound
 from .named_edit import CONTINUES, NamedEdit, NamedKey, chained, part, retabled, table
-from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
 from .searched import Piece, searched_library
 
 _APART = 4

@@ -12,24 +12,24 @@ import numpy as np
 
 from ...annotation import Timeline
 from ...base.errors import BeyondMocapError, told_time
-from ..take_npz import write_player
 from ...files.tables import plain
 from ...files.whole import atomic_write
 from ...library.library import Library
-from ..crowd.correction import joined
 from ...motion.track.ball_path import BallPath
-from .content_digest import digest_of
+from ..crowd.correction import joined
 from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
-from ..folder import MatchFolder
 from ..crowd.kept_crowd import keep_parts, kept_parts
-from .kept_pieces import keep_piece, kept_piece
+from ..folder import MatchFolder
 from ..order import FORM, MatchOrder
 from ..parts import Part
 from ..player_edit import PlayerEdit
+from ..state import MatchState
+from ..take_npz import write_player
+from .content_digest import digest_of
+from .kept_pieces import keep_piece, kept_piece
 from .pool import Failed, Workplace, run
 from .searched import Piece
 from .splice import spliced
-from ..state import MatchState
 from .units import units_of
 from .work import Finish, finish_player, part_crowd, search_unit
 from .workplace_library import LibrarySource

@@ -16,8 +16,8 @@ from ...base.errors import InputError
 from ...library.features import FPS
 from ...synthesis.plan import Plan
 from ...synthesis.search.offer import SLOT
-from .cut_plan import cut_plan
 from ..player_edit import kept
+from .cut_plan import cut_plan
 
 WINDOW = 300.0
 """Seconds of a window's own part."""

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from ...files.bvh import bvh
-from ...synthesis.provenance import Provenance, provenance_of, write_provenance
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
+from ...synthesis.provenance import Provenance, provenance_of, write_provenance
 from ...synthesis.take import Take
 from ..crowd.crowd_window import CrowdPart, crowd_window
-from ..report.figures import player_report
 from ..player_edit import PlayerEdit
-from .searched import Piece, searched
+from ..report.figures import player_report
 from ..shown import shown
+from .searched import Piece, searched
 from .units import Unit
 from .workplace_library import LibrarySource, library_of
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ...base.errors import InputError
-from ...library.library import Library
 from ...library.build import build
+from ...library.library import Library
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...synthesis.quality import feet, root
-from ...synthesis.quality.played import Played, played_from_take
 from ...evaluation.report import evaluate, rounded
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
+from ...synthesis.quality import feet, root
+from ...synthesis.quality.played import Played, played_from_take
 from ...synthesis.take import Take
 
 _MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
@@ -79,7 +79,8 @@ def per_second(
     ground)."""
     start = int(np.floor(min(one.start_time for one in played) + 1e-6))
     end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
-    rows = {name: [None] * (end - start) for name in ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")}
+    names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
+    rows: dict[str, list] = {name: [None] * (end - start) for name in names}
     for one, track, deep in zip(played, tracks, overlap):
         second = np.floor(one.times + 1e-6).astype(int) - start
         for name, values, over in _curves(one, track, deep, ball):

@@ -11,7 +11,15 @@ import numpy as np
 
 from ...base.errors import told_time
 from ...evaluation.html_page import (
-    Html, build_image, build_list, build_page, build_row, build_section, build_table, element, fragment,
+    Html,
+    build_image,
+    build_list,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    element,
+    fragment,
 )
 from .results import LONGEST, MatchResults, PlayerResult, read_match_results
 from .strips import heat_strip, png

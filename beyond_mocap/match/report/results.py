@@ -113,7 +113,8 @@ def _teams(told) -> dict[str, TeamResult]:
 
 def _player(folder: Path, row: Mapping, teams: Mapping[str, TeamResult]) -> PlayerResult:
     name, (status, _, reason) = str(row["id"]), _text(row.get("status")).partition(":")
-    report, trouble = {}, ""
+    report: Mapping = {}
+    trouble = ""
     path = folder / f"{Path(_text(row.get('file')) or name).name}.report.json"
     if path.is_file():
         try:

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import BeyondMocapError
-from ..take_npz import read_player
-from ...library.library import Library
 from ...appearance.picture import pose_picture
+from ...base.errors import BeyondMocapError
+from ...library.library import Library
 from ..folder import read_state
 from ..shown import shown
+from ..take_npz import read_player
 
 SIZE = 224
 """Pixels of a side."""

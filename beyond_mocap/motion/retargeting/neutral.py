@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.vectors import cross, unit_vectors
 from .. import quaternion
-from ...base.arctangent import arctan2
 from ..humanoid import Humanoid, Limb, heading_from_positions, identify
 from ..motion import Motion, forward_kinematics, local_rotations, pose_kinematics
 from ..skeleton import Skeleton, frozen_array
@@ -166,7 +166,7 @@ def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: floa
 
 
 def _has_tip(skeleton: Skeleton, joint: int) -> bool:
-    return joint in skeleton.end_parents and np.linalg.norm(_tip(skeleton, joint)) > 1e-4
+    return joint in skeleton.end_parents and bool(np.linalg.norm(_tip(skeleton, joint)) > 1e-4)
 
 
 def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:

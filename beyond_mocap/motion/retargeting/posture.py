@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class Posture:
     def __len__(self) -> int:
         return len(self.hips)
 
-    def changed(self, **arrays: np.ndarray) -> "Posture":
+    def changed(self, **arrays: Any) -> "Posture":
         """The same posture with some arrays replaced."""
         return replace(self, **arrays)
 

@@ -15,6 +15,7 @@ steps than their own. Joints that a skeleton lacks go with the segment that carr
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,11 +23,11 @@ import numpy as np
 
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
-from .anatomy import Anatomy, head_chain, spine_shares, study
-from .bone_map import Pairs, pair
 from ..humanoid import Limb
 from ..motion import Motion, forward_kinematics, local_rotations
 from ..skeleton import Skeleton
+from .anatomy import Anatomy, head_chain, spine_shares, study
+from .bone_map import Pairs, pair
 
 _SOFT = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
@@ -250,7 +251,7 @@ def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
     return 0.5 * (places[:, anatomy.body.left.upper_leg] + places[:, anatomy.body.right.upper_leg])
 
 
-def _between(shares: list[float], turns: list[np.ndarray], share: float) -> np.ndarray:
+def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], share: float) -> np.ndarray:
     """The turn (T, 4) at `share` among `turns` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)

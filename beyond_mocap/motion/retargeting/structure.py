@@ -72,7 +72,7 @@ def _onward(parents, lengths) -> list[int]:
     return onward
 
 
-def _limb(lengths, onward, start: int) -> tuple[int, int, int] | None:
+def _limb(lengths, onward, start: int) -> tuple[int, ...] | None:
     """The three joints around the two longest bones in a row on the way from `start` to its farthest end."""
     chain = [start]
     while onward[chain[-1]] >= 0:

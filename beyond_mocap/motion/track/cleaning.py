@@ -301,7 +301,7 @@ def _no_ball(track: Track) -> np.ndarray:
     return ~np.isfinite(track.ball[:, :2]).all(axis=1)
 
 
-def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[str]:
+def _warnings(track: Track, snaps: tuple[float, ...], gaps) -> list[TimedLine]:
     """What was left as it is although nobody should believe it."""
     speed = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
     fast = track.times[1:][speed > FASTEST]

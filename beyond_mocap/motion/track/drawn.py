@@ -11,8 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...base.time_series import interpolate
 from ...base.errors import InputError
+from ...base.time_series import interpolate
 from .data import Track
 
 HZ = 25.0  # samples a second of a track from a drawn line

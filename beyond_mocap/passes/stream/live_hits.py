@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...ball.contact import Tool
-from ..hits import HitMotion, analyse
 from ...motion.motion import Motion
+from ..hits import HitMotion, analyse
 from .listener import Arrived, Listener, poses
 
 WINDOW = 4.0

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.motion import world_rotation
 from ...motion.skeleton import Skeleton

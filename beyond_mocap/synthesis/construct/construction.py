@@ -20,19 +20,19 @@ import numpy as np
 from ...annotation.gaze import wanted_offset
 from ...library.library import Library
 from ...motion import quaternion
+from ...motion.foot_plant import Planted, plant
 from ...motion.track import SampledTrack
 from ..own_size import real_ball
+from ..resolved_plan import ResolvedPlan
+from ..search.footage import Footage, overlap
+from .ball.strike import Touch, strike
 from .banking import banked, missing_lean
 from .cross_fade import faded_rotations, faded_values, share
 from .face_ball import turned_to_ball
-from ...motion.foot_plant import Planted, plant
 from .give import give
+from .old_motion import OldMotion
 from .on_track import facing, firmness, pulled_to_track, root_with_sway
 from .steps import Steps, steps
-from .ball.strike import Touch, strike
-from ..search.footage import Footage, overlap
-from ..resolved_plan import ResolvedPlan
-from .old_motion import OldMotion
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

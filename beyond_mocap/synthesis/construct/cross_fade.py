@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.easing import quintic_step
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 
 
 def share(through: np.ndarray, after: np.ndarray) -> np.ndarray:

@@ -12,9 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
+from ...annotation.striking import faster_middle
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
-from ...annotation.striking import faster_middle
 from .ball.strike import Touch
 
 MOST = np.radians(60.0)
@@ -60,6 +60,6 @@ def _offset(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
 
 def _least(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
     """As much of the angle `apart` as brings a part (2,) within ALMOST of its goal (2,), all of it where none does."""
-    p, g = np.linalg.norm(part), np.linalg.norm(goal)
+    p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
     free = np.arccos(np.clip((p * p + g * g - ALMOST**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
     return float(np.sign(apart) * max(0.0, abs(apart) - free))

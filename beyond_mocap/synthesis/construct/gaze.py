@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
 from ...base.vectors import unit_vectors
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.humanoid import heading_from_positions, identify
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.track import zero_phase_hann

@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
+from ...motion.foot_plant import firmness
 from ...motion.humanoid import identify
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
-from ...motion.foot_plant import firmness
 
 GIVE = 0.1  # weight of a standing foot's movement
 STIFF = (2.0, 0.2)

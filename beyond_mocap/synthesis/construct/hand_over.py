@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import quaternion
+from ...motion.foot_plant import shift
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics, world_rotation
 from ...motion.skeleton import Skeleton
 from .ball.carry import Body, Resting, leg, limb_carried
-from ...motion.foot_plant import shift
 from .ball.meeting import eased
 
 Pose = tuple[np.ndarray, np.ndarray]
@@ -53,7 +53,8 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
 
 
 def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
-    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion has
+    """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion
+    has
     them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
 
     place (T, 3) m and foot (T, 4): of the ankle, world; motions: joints' places (T, J, 3) m of the new and the old one.

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...annotation import spoken
-from ...library.library import Library
 from ...annotation.ball_contact import striking_part
-from .ball.strike import Touch
-from ..take import KeyResult
+from ...library.library import Library
 from ..search.edit_list import EditList
 from ..search.footage import Shown
 from ..search.wanted import Wanted, needed
+from ..take import KeyResult
+from .ball.strike import Touch
 
 OTHERWISE = 0.4
 """Seconds before and after a key moment that nothing in the library shows in which the body comes to the ball and goes

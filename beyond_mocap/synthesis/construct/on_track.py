@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.banded_least_squares import BandedLeastSquares
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...base.banded_least_squares import BandedLeastSquares
 from ...base.runs import runs
+from ...motion import quaternion
 from ...motion.track import zero_phase_hann
 
 TURN_WEIGHT = 12.0  # of the recording's own turning per frame, against the direction of travel

@@ -14,16 +14,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
+from ...base.runs import runs
 from ...base.vectors import unit_vector
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.humanoid import Humanoid, heading_from_positions, identify
 from ...motion.motion import Motion, pose_kinematics
-from ...base.runs import runs
+from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from .ball.carry import arm, leg
-from ...motion.reach import two_bone
 
 FADE = 0.3
 """Seconds before and behind a pin in which the body comes to it and leaves it."""
@@ -304,13 +304,13 @@ class _Part:
         self.root = self.root - drop[:, None] * [0.0, 0.0, 1.0]
         self._posed()
 
-    def _lack(self, joint: int, goal: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
         """(W,) m that `joint` is too far from the goal, setting in softly, and (W, 3) the way there."""
         away = goal - self.places[:, joint]
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         return _SOFT_LACK * np.logaddexp(0.0, (distance - reach) / _SOFT_LACK), away / distance[:, None]
 
-    def _bend(self, spine: list[int], top: int, goal: np.ndarray, reach: float, share: np.ndarray) -> None:
+    def _bend(self, spine: list[int], top: int, goal: np.ndarray, reach, share: np.ndarray) -> None:
         """Turns the joints of the spine evenly so that `top` comes nearer to the goal by what it lacks."""
         lack, way = self._lack(top, goal, reach)
         low = self.places[:, spine[0]]

@@ -18,7 +18,7 @@ def bump(offset: np.ndarray, reach: float) -> np.ndarray:
     return np.where((offset < -reach) | (offset > reach), 0.0, np.where(offset < 0, rising, falling))
 
 
-def reaches(seams: np.ndarray, count: int, longest: int = LONGEST) -> np.ndarray:
+def reaches(seams: np.ndarray, count: int, longest: float = LONGEST) -> np.ndarray:
     """(S,) the s of eq. 25 for each seam: half of the shorter neighbouring stretch, so that windows never overlap, and
     at most `longest` frames."""
     edges = np.concatenate([[0], seams, [count]])
@@ -26,7 +26,9 @@ def reaches(seams: np.ndarray, count: int, longest: int = LONGEST) -> np.ndarray
     return np.minimum(np.minimum(lengths[:-1], lengths[1:]) / 2.0, longest)
 
 
-def spread_values(values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: int = LONGEST) -> np.ndarray:
+def spread_values(
+    values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST
+) -> np.ndarray:
     """Values (T, ...) without their jumps at `seams`; `ahead` (S, ...): what the frame at each seam would have been if
     the piece before had gone on."""
     out = np.array(values, dtype=float)
@@ -36,7 +38,9 @@ def spread_values(values: np.ndarray, seams: np.ndarray, ahead: np.ndarray, long
     return out
 
 
-def spread_rotations(rotations: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: int = LONGEST) -> np.ndarray:
+def spread_rotations(
+    rotations: np.ndarray, seams: np.ndarray, ahead: np.ndarray, longest: float = LONGEST
+) -> np.ndarray:
     """The same for rotations (T, J, 4), `ahead` (S, J, 4): the discontinuity of eq. 26 is the rotation from the
     expected pose to the one after the seam, spread as a share of its rotation vector.
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...motion.skeleton import Skeleton
 from ...motion.foot_plant import plant
+from ...motion.skeleton import Skeleton
 from .hand_over import Pose, handed_over, old_share
 from .steps import steps
 

@@ -16,15 +16,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.easing import smoothstep
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...base.easing import smoothstep
+from ...base.runs import runs
+from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics
-from ...base.runs import runs
+from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
-from ...motion.reach import two_bone
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
@@ -214,7 +214,7 @@ class _Foot:
             quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge[at]]), self.world[edge[at]])
             for edge in (self.before, self.behind)
         ]
-        turned = quaternion.slerp(*turn, self.through[at])
+        turned = quaternion.slerp(turn[0], turn[1], self.through[at])
         chain = (self.limb.upper_leg, self.limb.lower_leg, self.limb.foot)
         out = rotations.copy()
         out[at] = two_bone(skeleton, root[at], rotations[at], chain, target, end_rotation=turned).rotations
@@ -236,7 +236,7 @@ class _Plan:
         )
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._room())
-        self.last = None
+        self.last: int | None = None
         self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
 
     def _room(self) -> np.ndarray:

@@ -7,18 +7,18 @@ from dataclasses import replace
 import numpy as np
 
 from ...library.library import Library
+from ...motion.foot_plant import Planted
 from ...motion.humanoid import identify
 from ...motion.motion import pose_kinematics
 from ...motion.track import SampledTrack
-from ...motion.foot_plant import Planted
+from ..resolved_plan import ResolvedPlan
+from ..search.footage import Footage
+from ..search.locomotion import travelled_distance
+from .construction import Construction, apply_heading
 from .joining import chained_facing, chained_root, torso_corrections
 from .on_track import facing, root_with_sway
 from .smoothing import spread_rotations, spread_values
 from .steps import Steps
-from ..search.footage import Footage
-from ..search.locomotion import travelled_distance
-from ..resolved_plan import ResolvedPlan
-from .construction import Construction, apply_heading
 
 
 def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps]:

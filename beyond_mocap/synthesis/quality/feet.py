@@ -11,9 +11,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ...base.runs import runs
 from ...motion import quaternion
 from ...motion.humanoid import identify
-from ...base.runs import runs
 from ...motion.skeleton import Skeleton
 
 NOTICED_SLIDE = 0.021

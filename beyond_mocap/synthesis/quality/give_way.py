@@ -14,10 +14,10 @@ import numpy as np
 
 from ...annotation import Timeline, words_per_frame
 from ...base.errors import TimedLine, told_time
-from ...library.library import Library
-from ...library.landings import LANDING_FOLDER
-from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ...base.runs import runs
+from ...library.landings import LANDING_FOLDER
+from ...library.library import Library
+from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ...motion.track import Track
 from . import feet, jerk, root
 from .moments import Moment, met, moments

@@ -9,9 +9,9 @@ import numpy as np
 
 from ...annotation import KeyMoment
 from ...annotation.ball_contact import contact_gap, meeting_words, met_within
+from ...annotation.striking import part_surfaces, smallest_gap
 from ...library.library import Library
 from ...library.made import MADE_FOLDER
-from ...annotation.striking import part_surfaces, smallest_gap
 from ...motion.track import Track
 from ..take import DribbleTouch
 from . import pieces

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from ...base.errors import InputError
-from ...library.library import Library
 from ...library.landings import LANDING_FOLDER
+from ...library.library import Library
 from ...library.made import FPS as MADE_FPS
 from ...library.made import MADE_FOLDER
 from ...motion import contacts as foot_contacts
@@ -116,7 +116,8 @@ def played_from_tables(
 ) -> Played:
     """What a motion read from a file plays, with its provenance and ball where they are known.
 
-    provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths), clip_frame (T,),
+    provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
+    clip_frame (T,),
     mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and
     contacts are detected on the motion itself. where: the table's file, for messages. InputError where it has another
     length.

@@ -6,6 +6,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 _SLACK = 1e-9
 
@@ -19,7 +20,7 @@ class Target:
     own: str | None = None
     beyond: float = 0.0
 
-    def bounds(self, flat: Mapping[str, object]) -> tuple[float | None, float | None]:
+    def bounds(self, flat: Mapping[str, Any]) -> tuple[float | None, float | None]:
         """Least and most for one report, flat as by `report.flat`; None where there is no such bound or it is
         unknown."""
         if self.own is None:

@@ -15,7 +15,6 @@ from ...motion import quaternion
 from ...motion.motion import at_frames
 from .edit_list import EditList, at_times
 
-
 _HELD = 2  # frames for which a clip's end may be held in a fade
 
 

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
+from ...annotation.striking import faster_middle
+from ...base.arctangent import arctan2
 from ...library.keys import Key
 from ...library.library import Library
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.motion import at_frames, pose_kinematics
-from ...annotation.striking import faster_middle
 from ...motion.track import SampledTrack
 from .wanted import pool_frame
 

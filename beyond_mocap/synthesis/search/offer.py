@@ -9,8 +9,8 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ...annotation import DISCRETE
-from ...library.library import Library
 from ...base.arctangent import arctan2
+from ...library.library import Library
 from .annotation_cost import AnnotationCost
 
 SLOT = 8

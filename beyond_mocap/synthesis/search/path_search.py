@@ -106,7 +106,8 @@ class PathSearch:
         self.pieces = key_pieces(library, wanted, self.edges)
         self.choice_cost = self._choice_costs()
         self._closed = {slot_of(self.edges, wanted.keys[number].frame) for number in self.pieces.wanted}
-        self.width, self.hurried = Width(), None
+        self.width = Width()
+        self.hurried: int | None = None
         self._report = progress or (lambda fraction, text: None)
         self._cancelled = cancelled or (lambda: False)
         self._hurry, self._narrow = hurry or (lambda: False), narrow
@@ -263,7 +264,7 @@ class PathSearch:
     def _bound(self, slot: int, before: States, ends: np.ndarray, bound: np.ndarray):
         """Pieces of key moments that go on."""
         clip, start, rate = before.clip[bound], ends[bound], before.rate[bound]
-        cost = before.cost[bound] + self.costs.key_misfit(*self.edges[slot : slot + 2], clip, start, rate)
+        cost = before.cost[bound] + self.costs.key_misfit(self.edges[slot], self.edges[slot + 1], clip, start, rate)
         return clip, start, rate, cost, bound, before.piece[bound]
 
     def _continued(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):

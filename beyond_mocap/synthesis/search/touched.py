@@ -15,9 +15,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...annotation.gaze import wanted_offset
+from ...base.runs import runs
 from ...library.library import Library
 from ...motion import quaternion
-from ...base.runs import runs
 from .edit_list import EditList, PlacedKey
 from .wanted import Wanted, WantedKey, needed
 

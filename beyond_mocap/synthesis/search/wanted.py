@@ -8,8 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import (
-    MUST_NOT, STANDING_SPEED, TRANSITION, KeyMoment, Timeline, automatic_gaits, avoided_per_frame, fill,
-    gait_thresholds, spoken, words_per_frame,
+    MUST_NOT,
+    STANDING_SPEED,
+    TRANSITION,
+    KeyMoment,
+    Timeline,
+    automatic_gaits,
+    avoided_per_frame,
+    fill,
+    gait_thresholds,
+    spoken,
+    words_per_frame,
 )
 from ...base.errors import NotInLibrary, TimedLine, told_time
 from ...library.automatic import automatic_words
@@ -96,8 +105,8 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
     own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
-    preferred = {"off_style": off_style, "weak_foot": weak_foot, "taste": own}
-    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, **preferred)
+    return Wanted(track, tuple(asked), gait, timeline, keys, allowed, tuple(warnings), avoided, off_style=off_style,
+                  weak_foot=weak_foot, taste=own)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:

@@ -15,6 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...library.library import Library
+from ..resolved_plan import ResolvedPlan
+from ..search_library import search_library
 from .annotation_cost import AnnotationCost
 from .balance import balanced
 from .cheapest_way import Offered
@@ -22,8 +24,6 @@ from .edit_list import EditList
 from .offer import RATES, SLOT
 from .path_costs import Term, Weights
 from .path_search import MEMORY_SLOTS, PathSearch, States
-from ..resolved_plan import ResolvedPlan
-from ..search_library import search_library
 from .slots import Pieces, slot_edges
 from .transition_cost import distances, typical_distance, windows
 from .wanted import Wanted, build_order
@@ -258,7 +258,7 @@ def _others(search: PathSearch, way: _Way, slot: int, paid: float, count: int) -
             return
         if name not in known:
             known.add(name)
-            yield Other(*name, float(cost[number]) - paid)
+            yield Other(name[0], name[1], float(cost[number]) - paid)
 
 
 def _reason(library: Library, edit: EditList, first: int, end: int, costs, seam, others=()) -> Reason:

@@ -135,7 +135,7 @@ class _Places:
         last = self.drawn[player][-1][0] if self.drawn[player] else -_HOLD
         here = self.at(player, np.array([min(last, time) if time - last < _HOLD else time]))[0]
         left = max(time - last, 0.05) if time - last < _HOLD else _HOLD
-        return np.linalg.norm(place - here) < 4.5 * left
+        return bool(np.linalg.norm(place - here) < 4.5 * left)
 
 
 class _Play:

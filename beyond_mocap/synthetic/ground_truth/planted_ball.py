@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.time_series import interpolate
 from ...base.errors import InputError
+from ...base.time_series import interpolate
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
 from .planted_body import adult_share

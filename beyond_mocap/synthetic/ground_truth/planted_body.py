@@ -2,19 +2,19 @@
 
 Rigs rest in all kinds of poses and turn about all kinds of axes. Here any humanoid's motion is written on a skeleton
 whose joints, at rest, have the world's axes (X forward, Y left, Z up) in a T-pose: thumbs forward, palms down, knees
-and elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The turn of a hand about
-its forearm is the forearm's, as radius and ulna do it. Joints keep their places but for those of no meaning.
+and elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The turn of a
+hand about its forearm is the forearm's, as radius and ulna do it. Joints keep their places but for those of no meaning.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...motion import quaternion
-from ...motion.retargeting.anatomy import Anatomy, head_chain, study
 from ...base.arctangent import arctan2
+from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_posed
 from ...motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics
+from ...motion.retargeting.anatomy import Anatomy, head_chain, study
 from ...motion.skeleton import Skeleton
 
 _X, _Y, _Z = np.eye(3)
@@ -93,7 +93,7 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
             offsets[joint] = quaternion.rotate(quaternion.inverse(world[:, parent]), bone).mean(axis=0)
     ends = [name for name in names if name.removeprefix("Left").removeprefix("Right") in _TIPS]
     tips = np.array([_tip(name, motion, named[name], turns[name], leg) for name in ends]).reshape(-1, 3)
-    skeleton = Skeleton(names, parents, offsets, [names.index(name) for name in ends], tips)
+    skeleton = Skeleton(tuple(names), tuple(parents), offsets, tuple(names.index(name) for name in ends), tips)
     local = quaternion.normalized(local_rotations(skeleton, world))
     return Motion(skeleton, places[:, named["Hips"]], local, motion.fps)
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...markers.frames import mean_rotation
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
-from ...markers.frames import mean_rotation
 from .planted_markers import Planted
 
 _PARTS = ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")

@@ -14,13 +14,13 @@ from itertools import combinations
 import numpy as np
 
 from ...base.errors import InputError
+from ...markers.trial import MarkerTrial
 from ...motion.motion import Motion, forward_kinematics
 from .planted_ball import BallTruth, PlantedBall, planted_ball
 from .planted_body import calibration_pose, in_marker_axes
 from .planted_faults import Fault, Faults
 from .planted_places import SETS, STATIC_ONLY, Placed, placed
 from .planted_skin import on_skin
-from ...markers.trial import MarkerTrial
 
 _STATIC_SECONDS, _STATIC_FPS = 3.0, 100.0
 

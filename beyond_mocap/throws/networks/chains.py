@@ -12,10 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-
 from ...base.errors import InputError
-from ...motion.retargeting import structure
 from ...motion.humanoid import Limb, identify
+from ...motion.retargeting import structure
 from ...motion.skeleton import Skeleton
 
 HIERARCHY = ("hip", "body", "left_arm", "right_arm", "left_leg", "right_leg")

@@ -11,7 +11,6 @@ from .correct import bend_to, toward
 from .kinematics import Pose, one_pose, spread, transposed
 from .limits import JointLimits
 
-
 _STRETCH = 0.995  # share of a limb's length beyond which the body goes along
 _MOST = 0.05  # metres that it goes in one frame
 _ROUNDS = 4  # of moving the body towards what limbs do not reach

@@ -17,10 +17,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.vectors import unit_vector
-from ...base.errors import InputError
-from ...motion import quaternion
 from ...base.arctangent import arctan2
+from ...base.errors import InputError
+from ...base.vectors import unit_vector
+from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton, frozen_array
 
@@ -147,7 +147,7 @@ class JointLimits:
             allowed = self.offsets(given)
             low, high = np.minimum(low, allowed), np.maximum(high, allowed)
             most = np.maximum(most, -self.bends(given))
-        over = 0.0
+        over = np.zeros(())
         for _ in range(_TURNS):  # a hinge that comes forward may leave the box, and the other way round
             local, out = self._in_box(local, low, high)
             over, back = np.maximum(over, out), self._backwards(local, most)

@@ -132,7 +132,7 @@ class FrameNetwork:
             for w, b in zip(weights, biases)
         ]
 
-    def __call__(self, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    def __call__(self, x: np.ndarray, theta: np.typing.ArrayLike) -> np.ndarray:
         """Outputs (out,) float32 for inputs (in,), at control point weights (K,) (`phase_function.weights`)."""
         x, theta = np.asarray(x, np.float32), np.asarray(theta, np.float32)
         last = len(self._layers) - 1

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ...base.vectors import distance_along
 from ...base.errors import InputError
+from ...base.vectors import distance_along
 
 AT_RELEASE = 0.66
 """c of eq. 7.2: the phase at which the ball leaves, beside the third control point."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.arctangent import arctan2
 from ...base.errors import InputError
 from ...motion import quaternion
-from ...base.arctangent import arctan2
 from ...motion.between_frames import cubic_at
 from ...motion.motion import pose_kinematics
 from .chains import chains_of

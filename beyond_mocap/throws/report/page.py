@@ -8,7 +8,15 @@ from pathlib import PurePath
 import numpy as np
 
 from ...evaluation.html_page import (
-    Html, build_number_cell, build_page, build_row, build_section, build_table, build_title, element, fragment,
+    Html,
+    build_number_cell,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    build_title,
+    element,
+    fragment,
 )
 from .deviation import LOST
 from .strip import strip

@@ -4,7 +4,6 @@ from importlib import import_module
 
 import bpy
 import pytest
-
 from conftest import EXTENSION
 
 

@@ -30,7 +30,7 @@ def old(tmp_path):
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("migrate", "plans", "session", "strips", "tracks")}
+            for name in ("core.migrate", "result.plans", "core.session", "timeline.strips", "player.tracks")}
 
 
 def opened(path):
@@ -40,7 +40,7 @@ def opened(path):
 
 def test_settings_players_and_bodies_are_as_they_were(old, rooms):
     settings = opened(old)
-    assert settings.version == rooms["migrate"].VERSION
+    assert settings.version == rooms["core.migrate"].VERSION
     assert (settings.library_folder, settings.nearest, settings.start_frame) == ("//library", True, 5)
     assert (settings.alpha, settings.rate) == (pytest.approx(0.3), 25.0)
     first, second = settings.players
@@ -58,7 +58,7 @@ def test_the_words_count_before_and_after_they_are_on_the_timeline(old, rooms):
 
     def words():
         settings = bpy.context.scene.beyond_mocap
-        return [rooms["plans"].timeline_of(player, 30.0, rooms["tracks"].read_track(settings, player))
+        return [rooms["result.plans"].timeline_of(player, 30.0, rooms["player.tracks"].read_track(settings, player))
                 for player in settings.players]
 
     before = words()
@@ -67,7 +67,7 @@ def test_the_words_count_before_and_after_they_are_on_the_timeline(old, rooms):
     assert_one_step(bpy.ops.beyond_mocap.place_players)
     settings = bpy.context.scene.beyond_mocap
     for player in settings.players:
-        assert player.dot is not None and rooms["strips"].read(player, bpy.context.scene) is not None
+        assert player.dot is not None and rooms["timeline.strips"].read(player, bpy.context.scene) is not None
     assert words() == before
     assert settings.players[1].annotation_text.as_string() == "1.0 3.0 walking\n"
     assert not bpy.ops.beyond_mocap.place_players.poll()
@@ -101,7 +101,7 @@ def test_one_goes_on_where_one_had_stopped(old, rooms):
     assert before["keys"].items() <= after["keys"].items()
     bpy.ops.beyond_mocap.synthesize()
     assert bpy.ops.beyond_mocap.accept() == {"FINISHED"}
-    rooms["session"].clear()
+    rooms["core.session"].clear()
 
 
 def test_what_this_version_saves_is_left_alone(old, rooms, tmp_path):
@@ -113,13 +113,13 @@ def test_what_this_version_saves_is_left_alone(old, rooms, tmp_path):
     saved = state()
     opened(tmp_path / "new.blend")
     assert state() == saved
-    assert {scene.beyond_mocap.version for scene in bpy.data.scenes} == {rooms["migrate"].VERSION}
+    assert {scene.beyond_mocap.version for scene in bpy.data.scenes} == {rooms["core.migrate"].VERSION}
 
 
 def test_takes_of_another_session_are_never_mistaken_for_this_one_s(old, rooms):
     """Names of takes are kept in files; a file from elsewhere must not find a take of this session under one."""
-    rooms["session"].clear()
-    name = rooms["session"].keep_take(None, None)
-    assert [rooms["session"].made(player.take) for player in opened(old).players] == [None, None]
+    rooms["core.session"].clear()
+    name = rooms["core.session"].keep_take(None, None)
+    assert [rooms["core.session"].made(player.take) for player in opened(old).players] == [None, None]
     assert not name.removeprefix("take-").isdigit()
-    rooms["session"].clear()
+    rooms["core.session"].clear()

@@ -14,7 +14,7 @@ CLIPS = ("standing_1", "walking_1_2", "jogging_2_9", "kick_low_inside")
 @pytest.fixture
 def rooms(extension):
     """scene.core.preferences and scene.core.session, both as they were afterwards."""
-    found = [importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("preferences", "session")]
+    found = [importlib.import_module(f"{extension.__name__}.scene.core.{name}") for name in ("preferences", "session")]
     yield found
     chosen = found[0].get()
     chosen.property_unset("cache_folder")

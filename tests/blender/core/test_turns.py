@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import bpy
 import pytest
-
 from test_players import library_folder, match, ready, session  # noqa: F401  (fixtures)
 
 TIMER, ESC, MOVE = (SimpleNamespace(type=t, value="PRESS") for t in ("TIMER", "ESC", "MOUSEMOVE"))

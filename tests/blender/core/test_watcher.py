@@ -261,9 +261,11 @@ def a_background_job(room, context):
 
 
 def a_match_child(room, _context):
-    """The process that makes a match."""
+    """The process that makes a match. As the command does, it listens to the signal itself: a shell's background job
+    would ignore it."""
     child, background = room("scene.match.child"), room("scene.core.background")
-    script = "import time, sys; print('{\"progress\": 0.5}', file=sys.stderr, flush=True); time.sleep(60)"
+    script = ("import signal, sys, time; signal.signal(signal.SIGINT, signal.default_int_handler);"
+              "print('{\"progress\": 0.5}', file=sys.stderr, flush=True); time.sleep(60)")
     child.subprocess, kept = SimpleNamespace(**vars(child.subprocess)), child.subprocess
     child.subprocess.Popen = lambda command, **options: kept.Popen([command[0], "-c", script], **options)
     try:
@@ -283,7 +285,7 @@ def a_live_update(room, _context):
     """Throws, flights, overlays and figures are worked out in threads of their own."""
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
-            for name in ("throws.live", "passes.live", "overlays.store", "ride.measure")]
+            for name in ("throws.live", "passes.live", "overlays.store", "path_editing.measure")]
     room("scene.throws.live")._seen["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))

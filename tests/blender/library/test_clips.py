@@ -4,15 +4,16 @@ import importlib
 import os
 
 import bpy
+import made
 import numpy as np
 import pytest
-import made
 from undo import assert_one_step, state
 
 
 @pytest.fixture
 def rooms(extension):
-    return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("armature", "action")}
+    names = ("rigs.armature", "core.action")
+    return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
 @pytest.fixture
@@ -43,13 +44,13 @@ def test_operator_gives_what_the_functions_give(core, rooms, clip):
     bpy.ops.beyond_mocap.import_clips(filepath=str(path))
     body = bpy.context.object
     assert body.name == "clip" and body.animation_data.action.name == "clip"
-    read = rooms["action"].read(body, bpy.context.scene)
+    read = rooms["core.action"].read(body, bpy.context.scene)
     assert read.skeleton.same_bones(motion.skeleton, 0.0)
     np.testing.assert_allclose(read.root_positions, motion.root_positions, atol=1e-6)
     np.testing.assert_allclose(read.rotations, motion.rotations, atol=1e-6)
-    other = rooms["armature"].create(bpy.context, motion.skeleton, "by function")
-    rooms["action"].write(other, motion, bpy.context.scene)
-    again = rooms["action"].read(other, bpy.context.scene)
+    other = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "by function")
+    rooms["core.action"].write(other, motion, bpy.context.scene)
+    again = rooms["core.action"].read(other, bpy.context.scene)
     assert np.array_equal(again.rotations, read.rotations) and np.array_equal(again.root_positions, read.root_positions)
 
 
@@ -83,13 +84,13 @@ def test_onto_the_selected_armature(core, clip, folder):
 def test_mirrored_twice_is_as_before(core, rooms, clip):
     play_at_clip_rate()
     bpy.ops.beyond_mocap.import_clips(filepath=str(clip[0]))
-    before = rooms["action"].read(bpy.context.object, bpy.context.scene)
+    before = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
     bpy.ops.beyond_mocap.mirror()
-    once = rooms["action"].read(bpy.context.object, bpy.context.scene)
+    once = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
     np.testing.assert_allclose(once.root_positions[0], before.root_positions[0], atol=1e-5)
     assert np.abs(once.rotations - before.rotations).max() > 0.1
     bpy.ops.beyond_mocap.mirror()
-    twice = rooms["action"].read(bpy.context.object, bpy.context.scene)
+    twice = rooms["core.action"].read(bpy.context.object, bpy.context.scene)
     places = core("motion.motion").forward_kinematics
     np.testing.assert_allclose(places(twice)[0], places(before)[0], atol=1e-4)
 
@@ -129,7 +130,7 @@ def test_nothing_given_and_nothing_selected():
 
 
 def test_an_armature_without_motion(core, rooms, tmp_path):
-    bpy.context.view_layer.objects.active = rooms["armature"].create(bpy.context, made.skeleton(core), "Still")
+    bpy.context.view_layer.objects.active = rooms["rigs.armature"].create(bpy.context, made.skeleton(core), "Still")
     with pytest.raises(RuntimeError, match="plays no action"):
         bpy.ops.beyond_mocap.mirror()
     with pytest.raises(RuntimeError, match="plays no action"):

@@ -11,7 +11,7 @@ from undo import assert_one_step, state
 
 @pytest.fixture
 def rooms(extension):
-    names = ("armature", "action", "foreign", "body")
+    names = ("rigs.armature", "core.action", "library.foreign", "stage.body")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -31,10 +31,10 @@ def exported(core, rooms, path, fps=30, lie=lambda rig: None):
     scene = bpy.context.scene
     scene.render.fps = fps
     scene.frame_start, scene.frame_end = 1, 61
-    rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    rig = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "Somebody")
     lie(rig)
-    rooms["action"].write(rig, motion, scene, 1.0)
-    rooms["body"].create(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
+    rooms["core.action"].write(rig, motion, scene, 1.0)
+    rooms["stage.body"].create(rig, "Somebody", (1, 0, 0), scene.collection, scene, motion)
     EXPORTERS[path.suffix](str(path))
     bpy.ops.wm.read_homefile(use_empty=True)
     return motion
@@ -52,7 +52,7 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
     motion = exported(core, rooms, path, fps)
     bpy.context.scene.render.fps = 24
     before = state()
-    takes = rooms["foreign"].read(path)
+    takes = rooms["library.foreign"].read(path)
     assert state() == before and bpy.context.scene.name == "Scene"
     back = takes[0].motion
     assert back.fps == pytest.approx(fps) and len(takes) == 1
@@ -62,7 +62,7 @@ def test_a_known_motion_comes_back_within_a_millimetre(core, rooms, tmp_path, en
         places_of(core, back, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
     assert apart.max() < 1e-3, apart.max()
-    clip = rooms["foreign"].as_clip(back)
+    clip = rooms["library.foreign"].as_clip(back)
     apart = np.linalg.norm(
         places_of(core, clip.motion, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
@@ -76,7 +76,7 @@ def test_an_armature_that_is_turned_moved_and_scaled(core, rooms, tmp_path, endi
 
     path = tmp_path / f"clip{ending}"
     motion = exported(core, rooms, path, 30, lie)
-    back = rooms["foreign"].read(path)[0].motion
+    back = rooms["library.foreign"].read(path)[0].motion
     apart = np.linalg.norm(places_of(core, back, motion.skeleton.names)[:, 0] - motion.root_positions, axis=-1)
     assert apart.max() < 1e-3
     grown = np.linalg.norm(back.skeleton.offsets[back.skeleton.index("LeftLeg")])
@@ -90,12 +90,12 @@ def test_several_animations_of_one_file(core, rooms, tmp_path):
     scene = bpy.context.scene
     scene.render.fps = 30
     motion = made.motion(core, 61)
-    rig = rooms["armature"].create(bpy.context, motion.skeleton, "Somebody")
+    rig = rooms["rigs.armature"].create(bpy.context, motion.skeleton, "Somebody")
     for name, count in (("short", 31), ("long", 61)):
-        rooms["action"].write(rig, motion.frames(0, count), scene, 1.0, name)
+        rooms["core.action"].write(rig, motion.frames(0, count), scene, 1.0, name)
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", export_animation_mode="ACTIONS")
     bpy.ops.wm.read_homefile(use_empty=True)
-    takes = rooms["foreign"].read(path)
+    takes = rooms["library.foreign"].read(path)
     assert [len(take.motion) for take in takes] == [61, 31] and "long" in takes[0].name
     bpy.ops.beyond_mocap.import_clips(filepath=str(path))
     assert len([thing for thing in bpy.data.objects if thing.type == "ARMATURE"]) == 2
@@ -111,7 +111,7 @@ def test_files_without_a_motion_are_told(rooms, tmp_path):
     for path, told in ((broken, "cannot be read"), (box, "no armature"), (tmp_path / "gone.glb", "no such file"),
                        (tmp_path / "x.abc", "no such file")):
         with pytest.raises(Exception, match=told):
-            rooms["foreign"].read(path)
+            rooms["library.foreign"].read(path)
     assert state() == before
 
 
@@ -122,7 +122,7 @@ def test_the_operator_gives_what_the_functions_give(core, rooms, tmp_path):
     assert_one_step(bpy.ops.beyond_mocap.import_clips, filepath=str(path))
     rig = bpy.context.object
     assert rig.name == "clip" and [o.type for o in bpy.data.objects] == ["ARMATURE"]
-    read = rooms["action"].read(rig, bpy.context.scene)
+    read = rooms["core.action"].read(rig, bpy.context.scene)
     apart = np.linalg.norm(
         places_of(core, read, motion.skeleton.names) - places_of(core, motion, motion.skeleton.names), axis=-1
     )
@@ -160,7 +160,7 @@ def test_a_library_of_foreign_clips_is_built_and_a_broken_one_left_out(core, mix
 
 
 def test_a_clip_is_converted_once_and_again_when_it_changes(core, rooms, mixed):
-    foreign = rooms["foreign"]
+    foreign = rooms["library.foreign"]
     assert len(foreign.Queue(mixed, None).todo) == 3
     bpy.ops.beyond_mocap.build_library()
     assert [path.name for path in foreign.Queue(mixed, None).todo] == ["broken.fbx"]

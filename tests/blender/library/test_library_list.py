@@ -11,7 +11,7 @@ from undo import assert_one_step, state
 
 @pytest.fixture
 def rooms(extension):
-    names = ("clips", "watch", "recordings", "armature", "action", "session")
+    names = ("library.clips", "library.watch", "library.recordings", "rigs.armature", "core.action", "core.session")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -89,7 +89,7 @@ def test_a_clip_comes_in_as_it_was_recorded(listed, folder, core, rooms):
     rig = bpy.context.object
     assert rig.name == "low" and rig["beyond_mocap_clip"] == "kicks/low.bvh"
     assert [o.type for o in rig.children] == ["MESH"]
-    read = rooms["action"].read(rig, bpy.context.scene)
+    read = rooms["core.action"].read(rig, bpy.context.scene)
     wanted = core("files.bvh.bvh").read(folder / "kicks/low.bvh").motion
     assert abs(read.root_positions - wanted.root_positions).max() < 1e-5
     assert_one_step(bpy.ops.beyond_mocap.import_clip, path="walk.bvh", dressed=False)
@@ -134,7 +134,7 @@ def test_the_list_is_not_saved_with_the_file(listed, tmp_path):
 
 
 def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
-    look, news = rooms["watch"].look, rooms["watch"].news
+    look, news = rooms["library.watch"].look, rooms["library.watch"].news
     before = look(str(folder))
     assert sorted(before) == ["kicks/low.bvh", "kicks/low.txt", "other.bvh", "walk.bvh", "walk.txt"]
     assert news(before, before) == ""
@@ -147,7 +147,7 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
 
 
 def test_watching_says_it_and_builds_nothing(listed, folder, rooms, core):
-    watch, settings = rooms["watch"], bpy.context.scene.beyond_mocap
+    watch, settings = rooms["library.watch"], bpy.context.scene.beyond_mocap
     assert not settings.library_watch
     core("files.bvh.bvh").write(folder / "new.bvh", made.motion(core, 20))
     watch._tick()

@@ -229,7 +229,8 @@ def test_markers_that_only_the_static_trial_has_are_of_the_set(core):
 
 def test_markers_without_names_go_to_the_side_they_are_near_to(core, tmp_path):
     known = core("synthetic.ground_truth.planted_markers").planted(
-        core("synthetic.gait").gait(1.4, 0.4, fps=100.0), "sprinter", seed=2, occlusion=0.0, swaps=0, jumps=0, unlabeled=0
+        core("synthetic.gait").gait(1.4, 0.4, fps=100.0), "sprinter", seed=2, occlusion=0.0, swaps=0, jumps=0,
+        unlabeled=0
     )
     path = tmp_path / "run.trc"
     lost = known.trial.renamed({"LHAND": "x53", "RHAND": "x52"})  # the set's own aliases have them the other way round

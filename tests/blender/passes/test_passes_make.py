@@ -155,7 +155,8 @@ def own_body(two, room, core, clips):
     """A body of the user's that shows the first player's motion, and the action it had."""
     clip = core("files.bvh.bvh").read(clips / "ready_1.bvh", 0.01)
     press(bpy.ops.beyond_mocap.passes_make)
-    own = room("rigs.armature").create(bpy.context, room("rigs.armature").skeleton_of(settings().players[0].body, two), "Mine")
+    armatures = room("rigs.armature")
+    own = armatures.create(bpy.context, armatures.skeleton_of(settings().players[0].body, two), "Mine")
     action = room("core.action").write(own, clip.motion.frames(0, 20), two)
     settings().players[0].body = own
     press(bpy.ops.beyond_mocap.passes_make)

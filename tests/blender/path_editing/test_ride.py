@@ -473,7 +473,8 @@ def test_a_new_curve_goes_round_every_corner_of_the_path(scene, part, extension,
     turn = np.linspace(-np.pi / 2, np.pi / 2, 20)
     bow = np.stack([15.0 + 0.3 * np.cos(turn), 0.3 + 0.3 * np.sin(turn), 0 * turn], axis=1)
     path = core.through(np.concatenate([[[0.0, 0.0, 0.0]], bow, [[0.0, 0.6, 0.0]]]), "hairpin", closed=closed)
-    drawn = part("path_editing.curve").read(scene, part("path_editing.curve").create(bpy.context, "Hairpin", path)).path()
+    curves = part("path_editing.curve")
+    drawn = curves.read(scene, curves.create(bpy.context, "Hairpin", path)).path()
     assert drawn.closed == closed
     own, made = length(path), length(drawn)
     s = np.linspace(0.0, min(own.length, made.length), 200)

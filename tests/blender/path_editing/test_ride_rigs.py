@@ -52,7 +52,7 @@ def ride(part, core):
     def go(rig, bent, **settings):
         scene, recipe = bpy.context.scene, core("path_editing.ride")
         wanted = recipe.RideSettings(**settings)
-        carrier = part("path_editing.carrier").carrier_of(rig)
+        carrier = part("path_editing.rigs").carrier_of(rig)
         carrier.check()
         read = carrier.read(scene)
         source = recipe.prepare(read.motion, wanted, read.standing)
@@ -203,7 +203,7 @@ def test_its_own_path_changes_nothing_and_another_is_gone_to_the_millimetre(
     rig = kind(recorded, part, rigify)
     bpy.context.view_layer.update()
     before = whole(part, rig)
-    carrier = part("path_editing.carrier").carrier_of(rig)
+    carrier = part("path_editing.rigs").carrier_of(rig)
     assert type(carrier).__name__ == "RigCarrier"
     seen = carrier.read(bpy.context.scene)
     assert whole(part, rig) == before  # looking changes nothing
@@ -237,7 +237,8 @@ def test_a_rig_on_its_path_is_saved_and_opened(part, recorded, tmp_path, kind):
     bpy.ops.wm.save_as_mainfile(filepath=file)
     bpy.ops.wm.open_mainfile(filepath=file)
     rig, scene = bpy.data.objects["Rig"], bpy.context.scene
-    assert part("path_editing.live").follow(scene) == 1 and rig.beyond_mocap_ride.told == ""  # the original is looked at again
+    assert part("path_editing.live").follow(scene) == 1  # the original is looked at again
+    assert rig.beyond_mocap_ride.told == ""
     np.testing.assert_allclose(shown(rig, [5, 20, 40]), was, atol=1e-5)
     rig.beyond_mocap_ride.curve.location.z += 0.5
     bpy.context.view_layer.update()

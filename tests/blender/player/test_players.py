@@ -144,11 +144,11 @@ def test_the_whole_road(extension, ready, core, session):
     synthesized = state()
     assert press(bpy.ops.beyond_mocap.accept) == {"FINISHED"}
     accepted = state()
-    rooms = {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in ("action", "bake")}
+    action = importlib.import_module(f"{extension.__name__}.scene.core.action")
     resample = core("motion.motion").resample
     for player in bpy.context.scene.beyond_mocap.players:
         take = session.made(player.take).take
-        read, expected = rooms["action"].read(player.body, bpy.context.scene), resample(take.motion, rate)
+        read, expected = action.read(player.body, bpy.context.scene), resample(take.motion, rate)
         assert abs(len(read) - len(expected)) <= 1
         count = min(len(read), len(expected))
         np.testing.assert_allclose(read.root_positions[:count], expected.root_positions[:count], atol=1e-5)

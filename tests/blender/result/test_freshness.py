@@ -6,14 +6,18 @@ import os
 import bpy
 import numpy as np
 import pytest
-
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
 from test_result import one  # noqa: F401  (fixture)
 
 
 @pytest.fixture
-def renew(extension):
-    freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
+def scene(extension):
+    return lambda name: importlib.import_module(f"{extension.__name__}.scene.{name}")
+
+
+@pytest.fixture
+def renew(scene):
+    freshness = scene("result.freshness")
     return lambda: freshness.renew(bpy.context.scene, bpy.context.scene.beyond_mocap.players[0])
 
 
@@ -45,10 +49,9 @@ def test_each_cause_has_its_line_and_update_mends_it(renew, made, ready, match, 
     assert renew().lines == ""
 
 
-def test_words_of_a_text_stay_the_words(renew, made, ready, session):  # noqa: F811
+def test_words_of_a_text_stay_the_words(renew, made, ready, scene):  # noqa: F811
     """A player without strips gets none by a synthesis: strips would count more than the text."""
-    scene = session.__name__.rpartition(".")[0]
-    dots, strips = (importlib.import_module(f"{scene}.{name}") for name in ("dots", "strips"))
+    dots, strips = scene("player.dots"), scene("timeline.strips")
     dots.remove(bpy.context.scene, made)
     text = bpy.data.texts.new("words")
     text.write("6.0 kick right\n")
@@ -59,9 +62,8 @@ def test_words_of_a_text_stay_the_words(renew, made, ready, session):  # noqa: F
     assert "words" in renew().lines
 
 
-def test_words(renew, made, ready, session):  # noqa: F811
-    plans = importlib.import_module(f"{session.__name__.rpartition('.')[0]}.plans")
-    strips = importlib.import_module(f"{session.__name__.rpartition('.')[0]}.strips")
+def test_words(renew, made, ready, session, scene):  # noqa: F811
+    plans, strips = scene("result.plans"), scene("timeline.strips")
     strips.add_moment(bpy.context, made, 9.0, ("kick",))
     assert "words" in renew().lines
     bpy.ops.beyond_mocap.update()

@@ -5,9 +5,8 @@ import importlib
 import bpy
 import numpy as np
 import pytest
-from undo import assert_one_step, press, state
-
 from test_players import library_folder, match, ready, refused, session  # noqa: F401  (fixtures)
+from undo import assert_one_step, press, state
 
 
 def look(player):

@@ -3,9 +3,9 @@
 import importlib
 
 import bpy
+import made
 import numpy as np
 import pytest
-import made
 
 
 @pytest.fixture

@@ -25,8 +25,8 @@ SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rigs.source", "rigs.fit", "export",
-                         "deliver")}
+            for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
+                         "rigs.source", "rigs.fit", "rigs.export", "rigs.deliver")}
 
 
 @pytest.fixture(scope="session")
@@ -39,8 +39,8 @@ def clip(core):
 @pytest.fixture
 def body(rooms, clip):
     bpy.context.scene.render.fps = RATE
-    made = rooms["armature"].create(bpy.context, clip.skeleton, "Body")
-    rooms["action"].write(made, clip, bpy.context.scene, START)
+    made = rooms["rigs.armature"].create(bpy.context, clip.skeleton, "Body")
+    rooms["core.action"].write(made, clip, bpy.context.scene, START)
     return made
 
 
@@ -134,9 +134,9 @@ def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
 
 def baked(rooms, rig, body, **wishes):
     source = rooms["rigs.source"].source_of(body, bpy.context.scene)
-    table = rooms["bone_maps"].suggest(rig)
+    table = rooms["rigs.bone_maps"].suggest(rig)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
-    return rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, bpy.context.scene, options))
+    return rooms["rigs.rig_bake"].lay(rooms["rigs.rig_bake"].fitted(rig, table, source, bpy.context.scene, options))
 
 
 @pytest.mark.parametrize("format", SUFFIXES)
@@ -189,7 +189,7 @@ def test_in_place_stays(rooms, body, tmp_path):
 def test_another_rate(rooms, body, tmp_path):
     skin(body)
     bpy.context.scene.render.fps, bpy.context.scene.render.fps_base = 24, 1.001
-    rooms["export"].write(bpy.context, [body], rooms["export"].Wanted(tmp_path / "out.glb", "GLB", rate=30.0))
+    rooms["rigs.export"].write(bpy.context, [body], rooms["rigs.export"].Wanted(tmp_path / "out.glb", "GLB", rate=30.0))
     seconds = (FRAMES - 1) / (24 / 1.001)
     found = read_back(tmp_path / "out.glb", int(np.floor(seconds * 30 + 1e-6)) + 1)
     assert len(found) >= 15
@@ -244,9 +244,9 @@ def test_bad_places_and_choices_are_told(rooms, body, tmp_path, core, monkeypatc
     select(still)
     assert "does not move" in complaint(path=tmp_path / "out.fbx", format="FBX")
     bpy.ops.object.select_all(action="DESELECT")
-    monkeypatch.setitem(rooms["export"]._OPERATORS, "USD", ("wm", "no_such_exporter"))
+    monkeypatch.setitem(rooms["rigs.export"]._OPERATORS, "USD", ("wm", "no_such_exporter"))
     with pytest.raises(core("base.errors").InputError, match="no USD exporter"):
-        rooms["export"].check("USD")
+        rooms["rigs.export"].check("USD")
 
 
 @pytest.mark.parametrize("suffix", (".fbx", ".glb", ".usdc"))
@@ -254,7 +254,7 @@ def test_what_the_command_delivers_comes_back(rooms, core, clip, tmp_path, suffi
     import types
 
     take = types.SimpleNamespace(motion=clip, ball=None, start_time=0.0)
-    rooms["deliver"].write(take, tmp_path / f"out{suffix}")
+    rooms["rigs.deliver"].write(take, tmp_path / f"out{suffix}")
     places, _ = core("motion.motion").forward_kinematics(clip)
     shown = {name: places[:, number] for number, name in enumerate(clip.skeleton.names)}
     assert_same(read_back(tmp_path / f"out{suffix}", FRAMES), shown)

@@ -26,8 +26,8 @@ FAMILIES = {"mixamo": rigs.mixamo, "unreal": rigs.unreal, "metahuman": rigs.meta
 @pytest.fixture
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-            for name in ("armature", "action", "channels", "bone_maps", "rig_bake", "rigs.posing", "rigs.source",
-                         "rigs.fit", "key_reduction", "rig", "rig_copy")}
+            for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
+                         "rigs.posing", "rigs.source", "rigs.fit", "rigs.key_reduction", "rigs.rig", "rigs.rig_copy")}
 
 
 @pytest.fixture(scope="session")
@@ -41,8 +41,8 @@ def clip(core):
 def body(rooms, clip):
     """An armature of the recording's own skeleton that plays it from frame START on."""
     bpy.context.scene.render.fps = 30
-    made = rooms["armature"].create(bpy.context, clip.skeleton, "Body")
-    rooms["action"].write(made, clip, bpy.context.scene, START)
+    made = rooms["rigs.armature"].create(bpy.context, clip.skeleton, "Body")
+    rooms["core.action"].write(made, clip, bpy.context.scene, START)
     return made
 
 
@@ -59,10 +59,10 @@ def rigify(tmp_path_factory):
 
 def bake(rooms, rig, body, **wishes):
     scene = bpy.context.scene
-    table = rooms["bone_maps"].suggest(rig)
+    table = rooms["rigs.bone_maps"].suggest(rig)
     source = rooms["rigs.source"].source_of(body, scene)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
-    return table, rooms["rig_bake"].lay(rooms["rig_bake"].fitted(rig, table, source, scene, options))
+    return table, rooms["rigs.rig_bake"].lay(rooms["rigs.rig_bake"].fitted(rig, table, source, scene, options))
 
 
 def directions(rig, table, frames=range(START, START + 60, 6)):
@@ -83,7 +83,7 @@ def test_limbs_point_where_the_sources_do(core, rooms, body, family):
     rig = FAMILIES[family]()
     table, baked = bake(rooms, rig, body, plants=False)
     mine, hips = directions(rig, table)
-    source, source_hips = directions(body, rooms["bone_maps"].suggest(body))
+    source, source_hips = directions(body, rooms["rigs.bone_maps"].suggest(body))
     arms = degrees(mine[:, :4], source[:, :4])
     assert arms.max() < 1.0, arms.max()  # nothing may turn an arm
     assert degrees(mine[:, 4:8], source[:, 4:8]).max() < 8.0  # legs reach the footprints of other legs
@@ -136,7 +136,7 @@ def test_a_generated_rigify_rig(rooms, body, rigify):
     limbs = [pair for pair in LIMBS if pair[0] in shown]
     frames = range(START, START + 60, 6)
     points = rigs.heads(rig, [shown[p] for pair in limbs for p in pair], frames)
-    source = rigs.heads(body, [rooms["bone_maps"].suggest(body)[p] for pair in limbs for p in pair], frames)
+    source = rigs.heads(body, [rooms["rigs.bone_maps"].suggest(body)[p] for pair in limbs for p in pair], frames)
     a, b = (p[:, 1::2] - p[:, 0::2] for p in (points, source))
     off = degrees(a / np.linalg.norm(a, axis=-1, keepdims=True), b / np.linalg.norm(b, axis=-1, keepdims=True))
     assert off[:, :4].max() < 1.5 and off.max() < 12.0, off.max(axis=0)
@@ -171,10 +171,10 @@ def test_bones_keep_their_rotation_mode_without_jumps(rooms, body):
         expected = found if expected is None else expected
     assert degrees(found, expected).max() < 0.05
     assert {bone: rig.pose.bones[bone].rotation_mode for bone in modes} == modes
-    curves = rooms["channels"].curves(baked.action, rig.animation_data.action_slot)
+    curves = rooms["core.channels"].curves(baked.action, rig.animation_data.action_slot)
     for bone in ("LeftArm", "RightArm", "Hips"):
-        values = [rooms["channels"].sample(curves[f'pose.bones["mixamorig:{bone}"].rotation_euler', i], baked.frames)
-                  for i in range(3)]
+        path, sample = f'pose.bones["mixamorig:{bone}"].rotation_euler', rooms["core.channels"].sample
+        values = [sample(curves[path, i], baked.frames) for i in range(3)]
         assert np.abs(np.diff(values, axis=1)).max() < 1.0
 
 
@@ -217,7 +217,8 @@ def test_in_place_and_its_way_make_the_whole(rooms, body):
 def test_helper_bones_are_left_alone_or_follow(rooms, body):
     rig = rigs.unreal()
     table, baked = bake(rooms, rig, body)
-    keyed = {path.split('"')[1] for path, _ in rooms["channels"].curves(baked.action, rig.animation_data.action_slot)}
+    curves = rooms["core.channels"].curves(baked.action, rig.animation_data.action_slot)
+    keyed = {path.split('"')[1] for path, _ in curves}
     assert keyed == set(table.values())
     _, baked = bake(rooms, rig, body, bakes_ik=True)
     pairs = rigs.heads(rig, ["ik_foot_l", "foot_l", "ik_hand_r", "hand_r", "ik_hand_l", "hand_l"], (START, START + 30))
@@ -254,7 +255,7 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
     before, limbs = rigs.heads(rig, ends, frames), directions(rig, table, frames)[0]
     for tolerance, turn, most in ((0.002, 1.0, 0.5), (0.01, 3.0, 0.3)):
         table, _ = bake(rooms, rig, body)
-        had, left = rooms["key_reduction"].reduce(rig, table, scene, tolerance, np.radians(turn))
+        had, left = rooms["rigs.key_reduction"].reduce(rig, table, scene, tolerance, np.radians(turn))
         assert left < most * had, (had, left)
         assert np.linalg.norm(rigs.heads(rig, ends, frames) - before, axis=-1).max() < 1.02 * tolerance + 1e-4
         assert degrees(directions(rig, table, frames)[0], limbs).max() < 6.0
@@ -296,7 +297,7 @@ def test_the_button_does_what_the_function_does(rooms, body):
     plain, rig = rigs.mixamo(), rigs.mixamo()
     table, _ = bake(rooms, plain, body)
     settings = choose(rig, body)
-    assert rooms["rig"].table_of(settings) == table
+    assert rooms["rigs.rig"].table_of(settings) == table
     assert press(bpy.ops.beyond_mocap.bake_to_rig) == {"FINISHED"}
     frames = range(START, START + 60, 9)
     np.testing.assert_array_equal(
@@ -338,7 +339,7 @@ def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
     press(bpy.ops.beyond_mocap.bake_to_rig)
     assert len(bpy.data.actions) == actions and "by hand" not in settings.told
     own = rig.animation_data.action
-    curve = next(iter(rooms["channels"].curves(own, rig.animation_data.action_slot).values()))
+    curve = next(iter(rooms["core.channels"].curves(own, rig.animation_data.action_slot).values()))
     curve.keyframe_points[7].co.y += 0.1
     value = curve.keyframe_points[7].co.y
     press(bpy.ops.beyond_mocap.bake_to_rig)
@@ -354,7 +355,7 @@ def test_all_selected_rigs_at_once(rooms, body):
     for one in several:
         one.select_set(True)
     press(bpy.ops.beyond_mocap.bake_to_rig, targets="SELECTED")
-    assert all(rooms["channels"].playing(one)[0] for one in several)
+    assert all(rooms["core.channels"].playing(one)[0] for one in several)
 
 
 def test_all_players_get_a_rig_each(rooms, body, clip):
@@ -371,7 +372,7 @@ def test_all_players_get_a_rig_each(rooms, body, clip):
     press(bpy.ops.beyond_mocap.bake_to_rig, targets="PLAYERS")
     first, second = (player.rig for player in settings.players)
     assert first == rig and second not in (None, rig) and second.children[0].modifiers[0].object == second
-    assert rooms["channels"].playing(second)[0] and rooms["channels"].playing(first)[0]
+    assert rooms["core.channels"].playing(second)[0] and rooms["core.channels"].playing(first)[0]
 
 
 def test_a_strip_in_tweak_mode_is_told(rooms, body):
@@ -386,12 +387,12 @@ def test_a_strip_in_tweak_mode_is_told(rooms, body):
     for verb in (bpy.ops.beyond_mocap.bake_to_rig, bpy.ops.beyond_mocap.unbake, bpy.ops.beyond_mocap.reduce_keys):
         assert "leave tweak mode" in complaint(verb)
     assert data.use_tweak_mode and data.action == own
-    motion, data = rooms["action"].read(body, bpy.context.scene), body.animation_data
+    motion, data = rooms["core.action"].read(body, bpy.context.scene), body.animation_data
     data.nla_tracks.new().strips.new("own", 1, data.action)
     data.action, before = None, len(bpy.data.actions)
     data.use_tweak_mode = True
     with pytest.raises(Exception, match="leave tweak mode"):
-        rooms["action"].write(body, motion, bpy.context.scene)
+        rooms["core.action"].write(body, motion, bpy.context.scene)
     assert len(bpy.data.actions) == before
 
 
@@ -403,7 +404,7 @@ def test_a_copy_plays_nothing_and_a_bad_map_copies_nothing(rooms, body):
     data = rig.animation_data
     data.nla_tracks.new().strips.new("own", 1, data.action)
     data.action = None
-    assert len(rooms["rig_copy"].copied(rig, "twin").animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
+    assert len(rooms["rigs.rig_copy"].copied(rig, "twin").animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
     settings.rig.target = rig
     for number in range(2):
         player = settings.players.add()
@@ -420,24 +421,24 @@ def test_players_with_rigs_of_their_own_need_no_chosen_one(rooms, body):
     for one in bpy.context.selected_objects:
         one.select_set(False)
     assert press(bpy.ops.beyond_mocap.bake_to_rig, targets="PLAYERS") == {"FINISHED"}
-    assert rooms["channels"].playing(player.rig)[0]
+    assert rooms["core.channels"].playing(player.rig)[0]
 
 
 def test_maps_are_kept_by_skeleton_and_written_to_files(rooms, tmp_path):
     rig = rigs.mixamo()
     settings = choose(rig, None)
-    table = rooms["rig"].table_of(settings)
+    table = rooms["rigs.rig"].table_of(settings)
     settings.bones["left toe"].bone = ""
     press(bpy.ops.beyond_mocap.keep_bone_map)
     settings.target = rigs.mixamo()  # another armature with the same bones
-    assert "left toe" not in rooms["rig"].table_of(settings) and "kept" in settings.told
-    assert rooms["bone_maps"].kept(rigs.unreal()) is None
+    assert "left toe" not in rooms["rigs.rig"].table_of(settings) and "kept" in settings.told
+    assert rooms["rigs.bone_maps"].kept(rigs.unreal()) is None
     bpy.ops.beyond_mocap.save_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
     press(bpy.ops.beyond_mocap.map_bones)
-    assert rooms["rig"].table_of(settings) == table
+    assert rooms["rigs.rig"].table_of(settings) == table
     bpy.ops.beyond_mocap.load_bone_map("EXEC_DEFAULT", filepath=str(tmp_path / "map.json"))
-    assert "left toe" not in rooms["rig"].table_of(settings)
-    for path in rooms["bone_maps"].kept_folder().iterdir():
+    assert "left toe" not in rooms["rigs.rig"].table_of(settings)
+    for path in rooms["rigs.bone_maps"].kept_folder().iterdir():
         path.unlink()
 
 
@@ -509,7 +510,7 @@ def test_linked_rigs_are_told_and_overrides_work(rooms, body, tmp_path):
     override.override_library.is_system_override = False
     settings.target = override
     assert press(bpy.ops.beyond_mocap.bake_to_rig) == {"FINISHED"}
-    assert rooms["channels"].playing(override)[0] is not None
+    assert rooms["core.channels"].playing(override)[0] is not None
 
 
 def test_a_rig_in_an_overridden_collection_is_copied_beside_it(rooms, tmp_path):
@@ -528,6 +529,6 @@ def test_a_rig_in_an_overridden_collection_is_copied_beside_it(rooms, tmp_path):
         bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
     )
     rig = next(one for one in over.all_objects if one.type == "ARMATURE")
-    twin = rooms["rig_copy"].copied(rig, "twin")
+    twin = rooms["rigs.rig_copy"].copied(rig, "twin")
     bpy.context.view_layer.update()
     assert twin.name in bpy.context.view_layer.objects

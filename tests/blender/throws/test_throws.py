@@ -338,7 +338,8 @@ def test_a_kept_throw_of_a_rig_and_a_bake_are_not_lost_by_the_next_throw():
 
 
 def a_ball(place, name="Ball of mine"):
-    ball = importlib.import_module(f"{EXTENSION}.scene.stage.ball").create(bpy.context, name, bpy.context.scene.collection)
+    balls = importlib.import_module(f"{EXTENSION}.scene.stage.ball")
+    ball = balls.create(bpy.context, name, bpy.context.scene.collection)
     ball.location = place
     return ball
 

@@ -13,7 +13,7 @@ SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
 @pytest.fixture
 def rooms(extension):
-    names = ("clip_annotation", "lanes", "lay_strips", "clips", "dots", "strips", "settings")
+    names = ("timeline.clip_annotation", "timeline.lanes", "timeline.lay_strips", "timeline.strips", "core.settings")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -40,10 +40,10 @@ def test_a_clip_is_opened_with_its_words(core, rooms, library, fps, base):
     shutil.copy(SAMPLE / "kick_low_top.txt", library / "kick_low_top.txt")
     assert bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh") == {"FINISHED"}
     rig = bpy.context.object
-    assert rooms["clip_annotation"].shown(rig) == "kick_low_top.bvh"
-    assert rooms["clip_annotation"].said(rig) == rows_of(core, library / "kick_low_top.bvh")
+    assert rooms["timeline.clip_annotation"].shown(rig) == "kick_low_top.bvh"
+    assert rooms["timeline.clip_annotation"].said(rig) == rows_of(core, library / "kick_low_top.bvh")
     assert rig.animation_data.action is not None, "the strips took the motion's place"
-    moment = rooms["lanes"].moments(rig)[0]
+    moment = rooms["timeline.lanes"].moments(rig)[0]
     assert moment.frame == round(1 + 156 / 60 * fps / base)
 
 
@@ -52,7 +52,7 @@ def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     assert bpy.ops.beyond_mocap.propose_words() == {"FINISHED"}
-    said = rooms["clip_annotation"].said(rig)
+    said = rooms["timeline.clip_annotation"].said(rig)
     kick = next(row for row in said if row.key is not None)
     assert {"kick", "right"} <= set(kick.words) and abs(kick.key - 156) <= 2
     assert press(bpy.ops.beyond_mocap.save_words) == {"FINISHED"}
@@ -68,9 +68,9 @@ def test_a_strip_that_is_moved_says_so_when_saved(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     keys = core("annotation")
-    clock = rooms["lanes"].written_for(rig)
-    rooms["lay_strips"].add_span(rig, keys.Span(0.0, 1.0, ("jogging", "front")), clock)
-    rooms["lay_strips"].add_moment(rig, keys.KeyMoment(2.6, ("kick", "left")), clock)
+    clock = rooms["timeline.lanes"].written_for(rig)
+    rooms["timeline.lay_strips"].add_span(rig, keys.Span(0.0, 1.0, ("jogging", "front")), clock)
+    rooms["timeline.lay_strips"].add_moment(rig, keys.KeyMoment(2.6, ("kick", "left")), clock)
     bpy.ops.beyond_mocap.save_words()
     rows = rows_of(core, library / "kick_low_top.bvh")
     assert [(row.start, row.end, row.key, row.words) for row in rows] == [
@@ -112,13 +112,13 @@ def test_proposals_beside_what_is_there(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     bpy.ops.beyond_mocap.propose_words(least=0.99)
     with pytest.raises(Exception, match="say nothing"):
-        rooms["clip_annotation"].said(bpy.context.object)
+        rooms["timeline.clip_annotation"].said(bpy.context.object)
     with pytest.raises(RuntimeError, match="say nothing"):
         bpy.ops.beyond_mocap.save_words()
     bpy.ops.beyond_mocap.propose_words()
-    count = len(rooms["clip_annotation"].said(bpy.context.object))
+    count = len(rooms["timeline.clip_annotation"].said(bpy.context.object))
     bpy.ops.beyond_mocap.propose_words(replace=False)
-    assert len(rooms["clip_annotation"].said(bpy.context.object)) > count
+    assert len(rooms["timeline.clip_annotation"].said(bpy.context.object)) > count
 
 
 def test_nothing_chosen_or_something_else():
@@ -139,7 +139,7 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     words = tmp_path / "words.txt"
     words.write_text("0 1 walking front\n0.5 kick left\n")
     assert_one_step(bpy.ops.beyond_mocap.import_words, directory=str(tmp_path), files=[{"name": "words.txt"}])
-    assert [row.words for row in rooms["clip_annotation"].said(bpy.context.object)] == [("walking", "front"),
+    assert [row.words for row in rooms["timeline.clip_annotation"].said(bpy.context.object)] == [("walking", "front"),
                                                                                         ("kick", "left")]
     bpy.ops.beyond_mocap.remove_clip()
     track = tmp_path / "player.csv"
@@ -147,7 +147,7 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     bpy.ops.beyond_mocap.import_tracking(filepath=str(track))
     assert_one_step(bpy.ops.beyond_mocap.import_words, filepath=str(words))
     settings = bpy.context.scene.beyond_mocap
-    timeline = rooms["strips"].read(rooms["settings"].active_player(settings), bpy.context.scene)
+    timeline = rooms["timeline.strips"].read(rooms["core.settings"].active_player(settings), bpy.context.scene)
     assert [key.words for key in timeline.keys] == [("kick", "left")]
     (tmp_path / "words.txt").write_text("nonsense\n")
     before = state()

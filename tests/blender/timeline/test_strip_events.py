@@ -150,7 +150,8 @@ def test_muted_and_heard_again(dot, room, core):
 
 
 def test_an_automatic_strip_that_is_touched_becomes_asked_for(dot, tidied, room, parse):
-    room("timeline.lay_strips").set_automatic(dot, parse("0 1.013 standing\n5 6 walking\n"), room("timeline.lanes").written_for(dot))
+    laid = room("timeline.lanes").written_for(dot)
+    room("timeline.lay_strips").set_automatic(dot, parse("0 1.013 standing\n5 6 walking\n"), laid)
     assert not room("timeline.strip_events").tidy(dot)
     standing = strip_of(dot, "standing")
     standing.frame_start_raw = standing.action_frame_start = 11

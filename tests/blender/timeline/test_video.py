@@ -7,7 +7,6 @@ from importlib import import_module
 import bpy
 import numpy as np
 import pytest
-
 from conftest import EXTENSION
 
 PICTURES = 40

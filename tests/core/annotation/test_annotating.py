@@ -3,7 +3,17 @@
 import pytest
 
 from beyond_mocap.annotation.annotating import (
-    AddMoment, AddSpan, AtPlayhead, Go, KEYS, Leave, Now, State, Tell, pick, press,
+    KEYS,
+    AddMoment,
+    AddSpan,
+    AtPlayhead,
+    Go,
+    Leave,
+    Now,
+    State,
+    Tell,
+    pick,
+    press,
 )
 from beyond_mocap.annotation.decision import Held
 

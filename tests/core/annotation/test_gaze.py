@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.annotation.gaze import direction_words, wanted_offset
+from beyond_mocap.motion.track import Track, sample
 
 
 def track_past(ball, speed=0.9, seconds=6.0):

@@ -18,7 +18,8 @@ TOE_POKE = "toe_poke,toe poke,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
-    "beyond_mocap/synthetic/ground_truth/planted.py", "beyond_mocap/library/made.py", "beyond_mocap/throws/planted_examples.py",
+    "beyond_mocap/synthetic/ground_truth/planted.py", "beyond_mocap/library/made.py",
+    "beyond_mocap/throws/planted_examples.py",
 }  # fmt: skip
 ALLOWED = {
     "beyond_mocap/passes/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.ball_contact import contact_gap, met_within, striking_part
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.motion.quaternion import identity
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 
 SKELETON = adult_skeleton()
 BODY = identify(SKELETON)

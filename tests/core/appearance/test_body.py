@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.appearance.body import MATERIALS, deformed, low_poly_body
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.appearance.body import MATERIALS, deformed, low_poly_body
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
+from beyond_mocap.synthetic.gait import gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from beyond_mocap.appearance.picture import COLOURS, pose_picture
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import place
-from beyond_mocap.appearance.picture import COLOURS, pose_picture
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import Tool, ball_centre, in_world, striking_surface, struck_from
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics, place
-from beyond_mocap.annotation.striking import ball_gap
+from beyond_mocap.synthetic.gestures import strike
 
 
 @pytest.fixture(scope="module")

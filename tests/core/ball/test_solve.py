@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
 from beyond_mocap.ball.tracked.solve import solve
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.synthetic.ground_truth.planted import planted_match
+from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
 
 PLACES = np.array([[0.0, 0.0], [14.0, 3.0], [20.0, -9.0], [4.0, -12.0], [-9.0, -3.0]])
 NAMES = [f"home_{number}" for number in range(len(PLACES))]

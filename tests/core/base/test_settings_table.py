@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 from settings_page import PAGE, settings_page
 
-from beyond_mocap.cli.main import parser
 from beyond_mocap.ball.physics import THROWN
 from beyond_mocap.base import settings
+from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings import TABLES, setting
 from beyond_mocap.base.settings.options import option_values
 from beyond_mocap.base.settings.setting import Setting, check_limits
-from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.cli.main import parser
 from beyond_mocap.path_editing.path_frame import FRAMES
+from beyond_mocap.synthesis.plan import Plan
 
 OPTIONS = Path(__file__).resolve().parents[2] / "data" / "options-0.1.txt"
 PROBES = (

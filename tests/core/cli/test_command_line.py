@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import _interrupts, main
 from beyond_mocap.annotation import read_timeline
+from beyond_mocap.cli.main import _interrupts, main
 from beyond_mocap.cli.progress_reporter import Told
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.library.made import KICKED, MADE_FOLDER
+from beyond_mocap.motion.humanoid import stature
+from beyond_mocap.synthesis.provenance import read_provenance
 
 TOP = Path(__file__).resolve().parents[3]
 DATA = TOP.parent / "shared" / "data"

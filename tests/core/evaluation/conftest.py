@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import Timeline
-from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.library.library import Library
 from beyond_mocap.motion.motion import Motion, at_frames, concatenate, place
 from beyond_mocap.motion.track import Track, zero_phase_hann
 from beyond_mocap.motion.track.ball_path import BallPath
+from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.synthesis.take import KeyResult, Take
+from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0
 SOURCE_FPS = 60.0

@@ -7,10 +7,10 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.synthesis.quality.played import played_from_take
-from beyond_mocap.synthesis.quality.give_way import give_way, jolts, stretches
 from beyond_mocap.library.made import MADE_FOLDER
 from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.quality.give_way import give_way, jolts, stretches
+from beyond_mocap.synthesis.quality.played import played_from_take
 
 
 @pytest.fixture()

@@ -1,7 +1,15 @@
 """The shared page: no text becomes markup, and a page needs nothing but itself."""
 
 from beyond_mocap.evaluation.html_page import (
-    build_image, build_list, build_number_cell, build_page, build_row, build_section, build_table, element, fragment,
+    build_image,
+    build_list,
+    build_number_cell,
+    build_page,
+    build_row,
+    build_section,
+    build_table,
+    element,
+    fragment,
 )
 
 BAD = "<b>\"&'</b>"

@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.evaluation import realism
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics, place
 from beyond_mocap.motion.quaternion import from_rotation_vector
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 
 FPS = 30.0
 SKELETON = adult_skeleton()

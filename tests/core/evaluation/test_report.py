@@ -8,19 +8,18 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.provenance import provenance_of, read_provenance, write_provenance
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, words_per_frame
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.evaluation.report import evaluate, evaluate_played, table
-from beyond_mocap.synthesis.quality.played import played_from_tables, played_from_take
 from beyond_mocap.evaluation.figures import filled_timeline
-from beyond_mocap.evaluation.report import flat
-from beyond_mocap.files.bvh import bvh
+from beyond_mocap.evaluation.report import evaluate, evaluate_played, flat, table
 from beyond_mocap.files import tables
+from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.library import Gait
 from beyond_mocap.library.made import MADE_FOLDER
 from beyond_mocap.motion.motion import at_frames
 from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.provenance import provenance_of, read_provenance, write_provenance
+from beyond_mocap.synthesis.quality.played import played_from_tables, played_from_take
 
 FPS = 30.0
 KEY_FRAME = 300

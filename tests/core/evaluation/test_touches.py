@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.base.errors import InputError
 from benchmarks.touch_score import Reading, ReadTouch, read_touches, scored, scored_by_events
+from beyond_mocap.base.errors import InputError
 
 READ = Reading(
     ((10.0, 20.0), (40.0, 50.0)),

@@ -6,14 +6,14 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.markers.files.c3d import read_c3d
 from beyond_mocap.files.content import content, utf8
+from beyond_mocap.files.obj import read_mesh
+from beyond_mocap.files.tables import read_ball
+from beyond_mocap.markers.files.c3d import read_c3d
 from beyond_mocap.markers.files.marker_set_text import read_marker_set
 from beyond_mocap.markers.files.model_json import read_model
-from beyond_mocap.files.obj import read_mesh
-from beyond_mocap.passes.scene_json import read_scene
-from beyond_mocap.files.tables import read_ball
 from beyond_mocap.markers.files.trc import read_trc
+from beyond_mocap.passes.scene_json import read_scene
 
 READERS = (bvh.read, read_ball, read_c3d, read_marker_set, read_model, read_mesh, read_scene, read_trc)
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
 from provider_tables import PAGE, with_tables
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.tracking import tracking
 from beyond_mocap.files.tracking.feed import TrackingProvider
 from beyond_mocap.files.tracking.providers import PROVIDERS

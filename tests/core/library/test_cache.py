@@ -11,8 +11,8 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library import cache
-from beyond_mocap.library.library import Library
 from beyond_mocap.library.build import build
+from beyond_mocap.library.library import Library
 
 TOP = Path(__file__).resolve().parents[3]
 

@@ -16,11 +16,11 @@ from beyond_mocap.library.classify.signals import signals
 from beyond_mocap.library.classify.train import trained
 from beyond_mocap.library.classify.windows import LENGTH, windows
 from beyond_mocap.library.proposals import propose
+from beyond_mocap.motion.mirror import mirror
+from beyond_mocap.motion.motion import place, resample
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.synthetic.gestures import strike
-from beyond_mocap.motion.mirror import mirror
-from beyond_mocap.motion.motion import place, resample
 from beyond_mocap.synthetic.volleys import volley
 
 REAL = Path(__file__).resolve().parents[4] / "shared" / "data" / "mocap"

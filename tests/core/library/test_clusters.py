@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, block_starts, cluster_blocks
 from beyond_mocap.library.build import build
+from beyond_mocap.library.clusters import BLOCK_LENGTHS, CLUSTERS, block_starts, cluster_blocks
 
 
 @pytest.mark.parametrize("length", BLOCK_LENGTHS)

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.features import (
     HORIZON,
     describe,
@@ -13,10 +14,9 @@ from beyond_mocap.library.features import (
     raw_features,
     sampled_positions,
 )
-from beyond_mocap.library.clip import Clip
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import place
+from beyond_mocap.synthetic.gait import gait
 
 WALK = gait(1.6, 3.0, 60.0, turn_rate=0.4)
 

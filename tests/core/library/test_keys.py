@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import ClipAnnotation, spoken
-from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
 from beyond_mocap.library.clip import Clip
+from beyond_mocap.library.keys import Key, keys_of, nearest_serving, nearest_words, serving
 from beyond_mocap.synthetic.gait import gait
 
 

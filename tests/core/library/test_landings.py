@@ -9,12 +9,12 @@ import pytest
 
 from beyond_mocap.evaluation.reference import library_reference
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.landings import LANDING_FOLDER
 from beyond_mocap.library.build import build
-from beyond_mocap.synthetic.moves import getting_up
+from beyond_mocap.library.landings import LANDING_FOLDER
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize
+from beyond_mocap.synthetic.moves import getting_up
 
 
 @pytest.fixture(scope="module")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.annotation import read_annotation_csv
+from beyond_mocap.cli.main import main
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 

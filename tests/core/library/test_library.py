@@ -7,10 +7,10 @@ from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build
 from beyond_mocap.library.describe_clips import words_matrix
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthetic.gait import gait
 
 CSV = "file,start_frame,end_frame,key_frame,labels\n"
 

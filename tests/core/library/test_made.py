@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
-from beyond_mocap.synthesis.quality.feet import stance_travel, stances
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.keys import Key, standing_in
 from beyond_mocap.library.build import build
+from beyond_mocap.library.keys import Key, standing_in
 from beyond_mocap.library.made import BLENDED, FASTEST, KICKED, MADE_FOLDER, TAKEN, gaps
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.quality.feet import stance_travel, stances
 from beyond_mocap.synthesis.synthesize import synthesize
+from beyond_mocap.synthetic.gestures import strike
 
 
 def straight(speed: float, seconds: float = 6.0) -> Track:

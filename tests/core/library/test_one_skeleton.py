@@ -11,11 +11,11 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.one_skeleton import bring, bring_one
 from beyond_mocap.library.repair import slide
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthetic.gait import gait
 
 
 def legs_longer(factor: float):

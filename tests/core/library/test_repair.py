@@ -10,10 +10,10 @@ import pytest
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library import repair
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics, resample
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
 

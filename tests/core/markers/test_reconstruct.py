@@ -6,16 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.files.trc_write import write_trc
 from beyond_mocap.markers.model.model import BallMarker
-from beyond_mocap.synthetic.ground_truth.planted_markers import PlantedBall, planted
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import PlantedBall, planted
+from beyond_mocap.synthetic.throws import throw
 
 FPS = 100.0
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.report.page import trials_report
 from beyond_mocap.markers.report.impacts import aligned_impacts, dominant_sides, kept
+from beyond_mocap.markers.report.page import trials_report
 from beyond_mocap.markers.report.paired import paired
 from beyond_mocap.markers.report.results import Throw, TrialResult, read_results
 

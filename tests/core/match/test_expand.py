@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthesis.quality.give_way import give_way
-from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import sample
+from beyond_mocap.synthesis.quality.give_way import give_way
+from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.synthesize import constructed, synthesize
 

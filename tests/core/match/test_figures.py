@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.quality.played import played_from_take
 from beyond_mocap.evaluation.report import evaluate
 from beyond_mocap.match.report.figures import combined, per_second, player_report, time_lost
 from beyond_mocap.motion.track.ball_path import BallPath
+from beyond_mocap.synthesis.quality.played import played_from_take
 
 
 def test_time_lost_counts_every_second_once():

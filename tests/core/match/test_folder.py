@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.pieces.content_digest import digest_of
 from beyond_mocap.match.folder import file_names, opened, read_state
 from beyond_mocap.match.order import MatchOrder, identity
+from beyond_mocap.match.pieces.content_digest import digest_of
 
 TOP = Path(__file__).resolve().parents[3]
 

@@ -15,16 +15,16 @@ import pytest
 from beyond_mocap.base.errors import Cancelled
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball, read_rows
-from beyond_mocap.synthesis.provenance import read_provenance
-from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.shown import shown
+from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.motion.track.ball_path import BallPath
-from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
+from beyond_mocap.synthesis.provenance import read_provenance
 from tests.core.cli.test_command_line import assert_contract
+from tests.core.match.small_match import LIBRARY, PLAYERS, SECONDS, SMALL, TOP, kept_files
 
 FRAMES = round((SECONDS[1] - SECONDS[0]) * 30.0) + 1
 

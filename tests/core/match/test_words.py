@@ -7,16 +7,25 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import validate
 from beyond_mocap.annotation.event_words import TABLE, read_event_words
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
+from beyond_mocap.ball.solve_ball import solve_ball
 from beyond_mocap.ball.tracked.solve import SolvedTouch
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
 from beyond_mocap.match.labels.words import (  # fmt: skip
-    LEAST_CONFIDENCE, NEAREST, TOUCHES, USER, Moment, apart, dribbles, moment_of, timeline_of, words_of,
+    LEAST_CONFIDENCE,
+    NEAREST,
+    TOUCHES,
+    USER,
+    Moment,
+    apart,
+    dribbles,
+    moment_of,
+    timeline_of,
+    words_of,
 )
 from beyond_mocap.match.labels.words_text import edited, read_words, write_words
-from beyond_mocap.ball.solve_ball import solve_ball
+from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
+from beyond_mocap.synthetic.ground_truth.planted import planted_match
+from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
 
 
 def match_of(feed):

@@ -8,12 +8,12 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import GaitStyle, footsteps, gait, plan
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
+from beyond_mocap.synthetic.gait import GaitStyle, footsteps, gait, plan
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify, leg_length, side_and_part
 from beyond_mocap.motion.motion import place
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthetic.gait import gait
 
 # hips, spine, neck, head, then an arm (shoulder, upper, lower, hand) and a leg (upper, lower, foot, toe); {} the side
 FAMILIES = {

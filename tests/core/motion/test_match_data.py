@@ -8,12 +8,12 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.feed import Feed
-from beyond_mocap.motion.track.match_data import Match, MatchPlayer, presence_lines
 from beyond_mocap.files.tracking.match_repairs import mended_ball, mended_players, mended_sides, side_lines
-from beyond_mocap.files.tracking.team_colours import team_colours
 from beyond_mocap.files.tracking.providers import PROVIDERS
 from beyond_mocap.files.tracking.referees import referee_samples
+from beyond_mocap.files.tracking.team_colours import team_colours
 from beyond_mocap.files.tracking.tracking import read_match
+from beyond_mocap.motion.track.match_data import Match, MatchPlayer, presence_lines
 
 PERIODS = ((0.0, 99.9), (109.9, 209.8))
 

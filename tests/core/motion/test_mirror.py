@@ -8,11 +8,11 @@ import pytest
 
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, end_positions, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthetic.gait import gait
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 # a turn of the axes that lets bones which hang down lie along X, as LAFAN1's and Bandai-Namco's do

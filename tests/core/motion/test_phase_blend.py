@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import contacts
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.phase_blend import blend, strides
+from beyond_mocap.synthetic.gait import gait
 
 SLOW, FAST = 2.6, 4.0
 

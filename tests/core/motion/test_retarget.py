@@ -11,13 +11,13 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.motion.retargeting.bone_map import load, pair, save
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.motion.retargeting.bone_map import load, pair, save
 from beyond_mocap.motion.retargeting.retarget import Retargeter
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.synthetic.gait import gait
 
 MOCAP = Path(__file__).resolve().parents[4] / "shared/data/mocap"
 RECORDED = {

@@ -5,10 +5,10 @@ import pytest
 
 from beyond_mocap.passes.alike import alike, bones
 from beyond_mocap.passes.links import BONES, BoneWeights, aligned
-from beyond_mocap.synthesis.search.path_costs import Alike, PathCosts, Weights
-from beyond_mocap.synthesis.search.wanted import build_order
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.search.path_costs import Alike, PathCosts, Weights
+from beyond_mocap.synthesis.search.wanted import build_order
 
 
 def pose_distance(a, b):

@@ -5,14 +5,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import ball_centre, in_world, striking_surface, struck_from
-from beyond_mocap.passes.orders import HitOrder, Stance
-from beyond_mocap.passes.bodies import least_seconds, player_motion
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.motion.track.ball_path import BallPath
+from beyond_mocap.passes.bodies import least_seconds, player_motion
+from beyond_mocap.passes.orders import HitOrder, Stance
 
 FPS, RADIUS = 30.0, 0.105
 

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.passes.hit_library import KINDS, HitLibrary, MatchWeights
-from beyond_mocap.passes.hits import analyse
-from beyond_mocap.passes.links import BoneWeights, aligned
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build
+from beyond_mocap.motion.motion import place
+from beyond_mocap.passes.hit_library import KINDS, HitLibrary, MatchWeights
+from beyond_mocap.passes.hits import analyse
+from beyond_mocap.passes.links import BoneWeights, aligned
 from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.synthetic.gestures import strike
-from beyond_mocap.motion.motion import place
 from beyond_mocap.synthetic.moves import header
 
 

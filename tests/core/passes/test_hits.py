@@ -9,15 +9,15 @@ from scipy.special import erf
 
 from beyond_mocap.annotation import read_annotation_csv
 from beyond_mocap.ball.contact import Tool
-from beyond_mocap.passes.hits import analyse
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, concatenate, place
+from beyond_mocap.passes.hits import analyse
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.synthetic.moves import header
 
 RECORDED = Path(__file__).resolve().parents[3].parent / "shared" / "data" / "mocap"

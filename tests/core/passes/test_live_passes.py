@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from beyond_mocap.passes.hits import analyse
-from beyond_mocap.passes.sample_scenes import SAMPLES
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.passes.scene_json import parse_scene
-from beyond_mocap.passes.live_passes import FADE, answer, begin
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.passes.hits import analyse
+from beyond_mocap.passes.live_passes import FADE, answer, begin
+from beyond_mocap.passes.sample_scenes import SAMPLES
+from beyond_mocap.passes.scene_json import parse_scene
 
 CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
 

@@ -6,17 +6,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.passes.pass_court import ON_TARGET
-from beyond_mocap.passes.sample_scenes import SAMPLES
 from beyond_mocap.base.errors import Cancelled, InputError, NotInLibrary
-from beyond_mocap.passes.scene_json import parse_scene
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import at_frames, pose_kinematics
-from beyond_mocap.annotation.striking import ball_gap
+from beyond_mocap.passes.pass_court import ON_TARGET
 from beyond_mocap.passes.passes import ball_of, ball_path, planned
+from beyond_mocap.passes.sample_scenes import SAMPLES
+from beyond_mocap.passes.scene_json import parse_scene
 
 
 def scene_of(name="three", **changes):

@@ -7,21 +7,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import main
+from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import striking_surface
-from beyond_mocap.passes.links import BONES, BoneWeights
-from beyond_mocap.passes.pass_scene import Weights
-from beyond_mocap.passes.sample_scenes import SAMPLES
-from beyond_mocap.cli.progress_reporter import Told
 from beyond_mocap.base.errors import Cancelled, NotInLibrary
+from beyond_mocap.cli.main import main
+from beyond_mocap.cli.progress_reporter import Told
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.passes.scene_json import parse_scene
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.motion.humanoid import stature
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.annotation.striking import ball_gap
+from beyond_mocap.passes.links import BONES, BoneWeights
+from beyond_mocap.passes.pass_scene import Weights
 from beyond_mocap.passes.passes import ball_of, bone_weights, passes
+from beyond_mocap.passes.sample_scenes import SAMPLES
+from beyond_mocap.passes.scene_json import parse_scene
+from beyond_mocap.synthesis.provenance import read_provenance
 
 TALL = {
     "players": [{"name": "Ann", "place": [0, 0], "height": 1.5}, {"name": "Ben", "place": [4, 0], "height": 2.0}],

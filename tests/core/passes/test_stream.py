@@ -8,15 +8,15 @@ import time
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.passes.stream.bvh_stream import BvhStream, hierarchy_of
 from beyond_mocap.passes.stream.listener import LOOPBACK, Listener, poses
 from beyond_mocap.passes.stream.live_hits import LiveHits
 from beyond_mocap.passes.stream.sender import Sender
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.gestures import strike
 
 
 @pytest.fixture(scope="module")

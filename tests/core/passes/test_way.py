@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.easing import quintic_between
+from beyond_mocap.motion import quaternion
 from beyond_mocap.passes.orders import HitOrder, Stance
 from beyond_mocap.passes.way import SPEEDING, needed, placed, walked, way
-from beyond_mocap.motion import quaternion
 
 STILL = np.zeros(2)
 

@@ -8,15 +8,15 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.path_editing import cycle
 from beyond_mocap.path_editing.cycle import KEPT_SCALE, MOST_SCALE, SAME_LENGTH, cycled
 from beyond_mocap.path_editing.loops import find_loops, stride_frames
 from beyond_mocap.path_editing.path_frame import Residuals
 from beyond_mocap.path_editing.ride import RideSettings, prepare
+from beyond_mocap.synthetic.gait import gait
 
 PERIOD, FPS = 36, 30.0
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.path_editing.path_ride import figures
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.path.terrain import Terrain
 from beyond_mocap.path_editing.path_line import through
+from beyond_mocap.path_editing.path_ride import figures
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
+from beyond_mocap.synthetic.gait import gait
 
 RIGID = RideSettings(plant=False, lean=False)
 

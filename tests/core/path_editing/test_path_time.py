@@ -8,7 +8,14 @@ from beyond_mocap.motion.path.path import PolynomialPath
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.path_editing.path_frame import Residuals
 from beyond_mocap.path_editing.path_time import (
-    Way, Wishes, asked_length, by_arc_length, by_time, by_way, shown, stretched,
+    Way,
+    Wishes,
+    asked_length,
+    by_arc_length,
+    by_time,
+    by_way,
+    shown,
+    stretched,
 )
 
 ROWS, FPS, STEP = 301, 30.0, 0.05

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.path_editing.path_ride import figures
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.path_editing.path_line import through
+from beyond_mocap.path_editing.path_ride import figures
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
+from beyond_mocap.synthetic.gait import gait
 
 
 def line(length):

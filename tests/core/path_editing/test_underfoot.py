@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.motion.path.arc_length import ArcLength
 from beyond_mocap.motion.path.terrain import Terrain
-from beyond_mocap.path_editing.path_line import through
 from beyond_mocap.path_editing.ground_contact import footing, is_level, mesh_surface, path_surface
+from beyond_mocap.path_editing.path_line import through
 
 FPS, COUNT = 30.0, 90
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.cli.main import main
 from beyond_mocap.study.analysis import analysed, cliffs_delta, holm, welch
 from beyond_mocap.study.answers import read_answers
 from beyond_mocap.study.bars import rows_of

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.edit_list import find_seams
 from beyond_mocap.synthesis.search.distance import REACH, edit_list
+from beyond_mocap.synthesis.search.edit_list import find_seams
 
 SEEDS = range(40)
 

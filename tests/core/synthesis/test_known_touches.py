@@ -7,8 +7,8 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.synthesis.known_touches import FURTHEST, solve_touches
 from beyond_mocap.motion.track import BALL_RADIUS, Track, sample
+from beyond_mocap.synthesis.known_touches import FURTHEST, solve_touches
 from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
 from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize

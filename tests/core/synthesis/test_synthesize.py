@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.ball_contact import surfaces
+from beyond_mocap.annotation.striking import HEAD_RADIUS
 from beyond_mocap.base.errors import Cancelled, InputError, NotInLibrary
 from beyond_mocap.library.build import build
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.annotation.striking import HEAD_RADIUS
 from beyond_mocap.motion.track import BALL_RADIUS, Track, clean, sample, zero_phase_hann
 from beyond_mocap.synthesis.plan import METHODS, Plan
 from beyond_mocap.synthesis.synthesize import synthesize

@@ -7,12 +7,12 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.synthetic import gestures, moves
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.gait import GaitStyle, footsteps, gait, plan
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
 from beyond_mocap.motion.motion import Motion, end_positions, forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
+from beyond_mocap.synthetic import gestures, moves
+from beyond_mocap.synthetic.gait import GaitStyle, footsteps, gait, plan
 
 MOCAP = pathlib.Path(__file__).parents[3] / "../shared/data/mocap"
 FPS = 60.0

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from beyond_mocap.motion.retargeting.neutral import neutral_stance
 from beyond_mocap.synthetic.kick_subjects import KickManner, kick_style, kicker, styled
 from beyond_mocap.synthetic.kicks import BEFORE, KICKS, contact, kicked
-from beyond_mocap.motion.retargeting.neutral import neutral_stance
 
 
 def test_the_same_seed_is_the_same_person():

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.synthetic.landing import ends_in_flight, landed
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion, forward_kinematics, pose_kinematics
-from beyond_mocap.synthetic.moves import getting_up
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.resting import lowest_root, on_the_side, thickness
 from beyond_mocap.motion.spring import Offset
+from beyond_mocap.synthetic.landing import ends_in_flight, landed
+from beyond_mocap.synthetic.moves import getting_up
+from beyond_mocap.synthetic.resting import lowest_root, on_the_side, thickness
 
 FPS = 100.0
 SKELETON = adult_skeleton()

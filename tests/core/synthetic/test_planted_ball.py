@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
+from benchmarks.touch_score import Reading, ReadTouch, scored
+from beyond_mocap.ball.tracked.solve import solve
 from beyond_mocap.synthetic.ground_truth.planted import planted_match
 from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
-from beyond_mocap.ball.tracked.solve import solve
-from benchmarks.touch_score import Reading, ReadTouch, scored
 
 TIMES = np.arange(0.0, 60.0, 0.02)
 

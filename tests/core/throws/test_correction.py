@@ -6,13 +6,13 @@ import pytest
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.impact import crossing
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.throws.correction import Freedom, corrected
-from beyond_mocap.throws.letting_go import InHand, grip_point
-from beyond_mocap.throws.shift import shifts_about
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.correction import Freedom, corrected
+from beyond_mocap.throws.letting_go import InHand, grip_point
+from beyond_mocap.throws.shift import shifts_about
 
 
 def impact(found, target):

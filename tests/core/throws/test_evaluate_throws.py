@@ -6,21 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.throws import evaluate_throws as recipe
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
-from beyond_mocap.throws.report.page import throws_page
-from beyond_mocap.throws.report.strip import strip
 from beyond_mocap.files.tables import plain
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws import evaluate_throws as recipe
+from beyond_mocap.throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import example_of
 from beyond_mocap.throws.networks.generate import Generated
 from beyond_mocap.throws.networks.limits import learn
+from beyond_mocap.throws.report.page import throws_page
+from beyond_mocap.throws.report.strip import strip
 
 
 class Model:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.description import windows

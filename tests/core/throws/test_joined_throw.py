@@ -8,17 +8,15 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthesis.quality.jerk import jerk, windowed
 from beyond_mocap.library.build import build
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place
-from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.motion.track import BALL_RADIUS, Track
 from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
-from beyond_mocap.throws.join_throw import (
-    EASED, join_throw, library_jerk, stand_still, transition_jerk, trim_waiting,
-)
+from beyond_mocap.synthesis.quality.jerk import jerk, windowed
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.throws import throw
+from beyond_mocap.throws.join_throw import EASED, join_throw, library_jerk, stand_still, transition_jerk, trim_waiting
 from beyond_mocap.throws.leave_path import is_in_reach, leave_path, stopping_place
 from beyond_mocap.throws.run_up import OWN_WORD, add_throw_clip, construct_run_up
 
@@ -114,7 +112,7 @@ def test_a_key_moment_within_the_throw_by_its_solved_touch_gives_way_too(library
 
 
 def test_other_bones_and_sizes_keep_the_exact_throw(library, made):
-    # the adult of `motion.retargeting.adult` is not the library's skeleton: the way there is found on the library's bones
+    # `adult_skeleton` is not the library's skeleton: the way there is found on the library's bones
     motion = released_over(made, np.zeros(2))
     way = construct_run_up(library, going(0.0), motion, made.release, AT)
     assert way.motion.skeleton.names == motion.skeleton.names

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.networks.limb_limits import LimbLimits
 from beyond_mocap.throws.networks.limits import JointLimits, learn

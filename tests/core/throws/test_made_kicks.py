@@ -6,13 +6,13 @@ import pytest
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.impact import crossing
-from beyond_mocap.throws.made_kicks import kick
 from beyond_mocap.ball.physics import FOOTBALL
-from beyond_mocap.throws.struck import struck
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.throws.made_kicks import kick
+from beyond_mocap.throws.struck import struck
 
 ASKED = [
     ("right", "instep", (11.0, 0.0, 1.0), 25.0), ("left", "inside", (11.0, 2.0, 0.5), 18.0),

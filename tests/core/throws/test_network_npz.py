@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws import network_npz
-from beyond_mocap.throws.network_npz import read_model, write_model
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.throws import network_npz
+from beyond_mocap.throws.network_npz import read_model, write_model
 from beyond_mocap.throws.networks.example import Example
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork

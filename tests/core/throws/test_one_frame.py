@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.motion import Motion
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.networks.answers import answered

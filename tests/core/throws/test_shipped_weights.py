@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.report.deviation import deviations
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throw_subjects import subject
-from beyond_mocap.throws.planted_examples import planted
 from beyond_mocap.throws.networks.description import scaled
 from beyond_mocap.throws.networks.example import describe, example_of
 from beyond_mocap.throws.networks.generate import Options, generate
 from beyond_mocap.throws.networks.kinematics import matrices
 from beyond_mocap.throws.networks.limits import JointLimits
+from beyond_mocap.throws.planted_examples import planted
+from beyond_mocap.throws.report.deviation import deviations
 from beyond_mocap.throws.throw import WEIGHTS, Order, shipped_model, throw_at
 
 ACTIONS = ("throw", "kick")

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
+from beyond_mocap.annotation.striking import FOOT_RADIUS, ball_gap
 from beyond_mocap.ball.flight import Launch, fly
 from beyond_mocap.ball.impact import crossing
 from beyond_mocap.ball.physics import FOOTBALL
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.throws.correction import Freedom, corrected
 from beyond_mocap.throws.letting_go import AtFoot, leaving
 from beyond_mocap.throws.struck import RATIO, struck
-from beyond_mocap.synthetic.gestures import strike
-from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.annotation.striking import FOOT_RADIUS, ball_gap
 
 R = FOOTBALL.radius
 

@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.cli.main import main
 from beyond_mocap.ball.flight import fly
 from beyond_mocap.ball.impact import crossing
-from beyond_mocap.throws.letting_go import InHand, grip_point
 from beyond_mocap.base.errors import InputError
+from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.files.tables import read_ball
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.throws.throw import Order, throw_at, within
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.throws.join_throw import join_throw, stand_still
+from beyond_mocap.throws.letting_go import InHand, grip_point
+from beyond_mocap.throws.network_npz import write_model
+from beyond_mocap.throws.throw import Order, throw_at, within
 from tests.core.linear_throws import linear_model, planted_examples, planted_kicks
 
 

@@ -7,7 +7,6 @@ import pytest
 from beyond_mocap.cli.main import main
 from beyond_mocap.throws.network_npz import write_model
 from beyond_mocap.throws.planted_examples import write_planted
-
 from tests.core.linear_throws import linear_model, planted_examples
 
 

@@ -20,7 +20,6 @@ from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.planted_examples import COLUMNS, planted, write_planted
 from beyond_mocap.throws.throw_examples import examples_in
 
-
 HEAD = ",".join(COLUMNS[:11])
 
 

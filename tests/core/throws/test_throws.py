@@ -6,11 +6,10 @@ import pytest
 
 from beyond_mocap.ball.physics import BASEBALL, PAPER
 from beyond_mocap.evaluation.paired_tests import judged, kept
-from beyond_mocap.throws.report.deviation import deviations
-from beyond_mocap.throws.report.impact import impact, let_go
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.synthetic.throws import throw
-
+from beyond_mocap.throws.report.deviation import deviations
+from beyond_mocap.throws.report.impact import impact, let_go
 
 # Fredriksson's tables 8.1, 8.2, 8.5, 8.6 (m: left arm, right arm, left leg, right leg, impact; a row for each subject)
 SINGLE = np.array([

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion import quaternion
+from beyond_mocap.motion import quaternion, reach
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.motion import reach
 from beyond_mocap.throws.networks.correct import bend_to, toward
 
 MOTION = throw(fps=60.0).motion

@@ -89,7 +89,7 @@ def _parts(low: float, high: float, held, count: int, fps: float) -> list[Betwee
     return out
 
 
-def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[int], fps: float) -> np.ndarray:
+def _joined(path, feed, part: Between, first: int, last: int, others: Sequence[float], fps: float) -> np.ndarray:
     """The path led to the first touch and away from the last where nothing is met at the part's ends; first and last
     are counted from its beginning."""
     first, last = part.low + first, part.low + last

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....base.runs import runs
 from ....annotation.striking import nearest_on
+from ....ball.roll import rolls, speeds_of
+from ....base.runs import runs
 from ....motion.track import BALL_RADIUS
 from .legs import SLOW, Legs
 from .meeting import touching_places
-from ....ball.roll import rolls, speeds_of
 
 SOONEST, _LATEST = 0.2, 1.3
 """Seconds from one touch to the next."""
@@ -89,7 +89,7 @@ class Search:
         start[:, 2] = BALL_RADIUS
         radius = self.body.feet[0].radius
         level = np.column_stack([self.normal, np.zeros(len(table))])
-        self.place = touching_places(tuple(end[:, None] for end in line), radius, start, level)
+        self.place = touching_places((line[0][:, None], line[1][:, None]), radius, start, level)
         usable = np.abs(nearest_on(line, self.place)[:, 2] - BALL_RADIUS) <= _LEVEL
         velocity = np.stack([self.body.foot_velocity(0), self.body.foot_velocity(1)])
         self.velocity = velocity[self.side, self.frame]

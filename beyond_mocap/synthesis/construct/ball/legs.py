@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....annotation.striking import Surface, part_surfaces
 from ....motion import quaternion
 from ....motion.humanoid import heading_from_positions, identify
 from ....motion.motion import pose_kinematics
 from ....motion.skeleton import Skeleton
-from ....annotation.striking import Surface, part_surfaces
 from ....motion.track import BALL_RADIUS, zero_phase_hann
 
 SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ....annotation.striking import ball_gap, nearest_on
 from ....base.easing import quintic_step_by_powers
 from ....base.vectors import unit_vectors
 from ....motion.quaternion import turned_about_up
-from ....annotation.striking import ball_gap, nearest_on
 from ....motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3
@@ -138,7 +138,7 @@ def touching_places(line: Line, radius: float, start: np.ndarray, direction: np.
     return start + (near + step)[:, None] * direction
 
 
-def held_meeting(hands: Sequence[Line], radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
+def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
     """A ball between both hands: its place (3,) m, and what each hand has to move (2, 3) m to touch it."""
     places = np.array([0.5 * (start + end) for start, end in hands])
     middle = places.mean(axis=0)

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....base.vectors import unit_vector
 from ....annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
 from ....annotation.labels import list_labels
+from ....annotation.striking import Surface, ball_gap, part_surfaces
+from ....base.vectors import unit_vector
 from ....motion.humanoid import Limb, heading_from_positions, identify
 from ....motion.motion import pose_kinematics
 from ....motion.skeleton import Skeleton
-from ....annotation.striking import Surface, ball_gap, part_surfaces
 from ....motion.track import BALL_RADIUS
 from ..above_ground import above_ground
 from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
@@ -365,7 +365,7 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
     middle = np.mean(body.line(part, at), axis=0)
     away = _flat(middle + shift - pelvis)
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
-    ranged = np.clip(wanted, min(PELVIS_RANGE[0], own), max(PELVIS_RANGE[1], own))
+    ranged = np.clip(wanted, min(PELVIS_RANGE[0], float(own)), max(PELVIS_RANGE[1], float(own)))
     return shift + away * (ranged / max(wanted, 1e-9) - 1.0)
 
 
@@ -400,7 +400,7 @@ def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
     return [Resting.of(body, leg(limb) if part == "foot" else arm(limb)) for limb, part in limbs]
 
 
-def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: Sequence[np.ndarray]) -> Body:
+def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarray) -> Body:
     """The body with each part moved by its shift (3,) m, blended by its share."""
     part, root, rotations = scene.parts[0], body.root, body.rotations
     if not limbs:

@@ -7,9 +7,9 @@ import pytest
 
 from beyond_mocap.base.errors import Cancelled, InputError, spans_of
 from beyond_mocap.markers.cleaning.clean import CleanSettings, clean
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 from beyond_mocap.markers.trial import MarkerTrial
 from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 
 
 @pytest.fixture(scope="module")

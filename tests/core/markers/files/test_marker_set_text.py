@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.files.marker_set_text import (
-    SHIPPED, chosen_set, marker_set_text, parse_marker_set, read_marker_set, shipped_sets,
+    SHIPPED,
+    chosen_set,
+    marker_set_text,
+    parse_marker_set,
+    read_marker_set,
+    shipped_sets,
 )
 from beyond_mocap.markers.model.marker_set import MarkerSet
 

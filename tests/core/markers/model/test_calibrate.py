@@ -6,10 +6,10 @@ import pytest
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.model.calibrate import calibrate, from_static
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 from beyond_mocap.markers.pose.pose import PoseSettings, solve
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 
 LIMBS = [side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")]
 

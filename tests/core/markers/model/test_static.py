@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 from beyond_mocap.markers.model.static import static_frame, stillest
 from beyond_mocap.markers.trial import MarkerTrial
 from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 
 
 @pytest.fixture(scope="module")

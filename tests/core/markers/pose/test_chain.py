@@ -8,7 +8,6 @@ from beyond_mocap.markers.pose import elimination
 from beyond_mocap.markers.pose.chain import Placed, axes, chain, marker_derivative, moved, place, poses
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.motion import pose_kinematics
-
 from tests.core.markers.small_chain import HINGE, SADDLE, SKELETON, random_poses, small_chain
 
 

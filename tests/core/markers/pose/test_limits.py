@@ -7,7 +7,6 @@ from beyond_mocap.markers.pose import limits
 from beyond_mocap.markers.pose.chain import angles_of, place
 from beyond_mocap.markers.pose.descent import Task, descend
 from beyond_mocap.motion import quaternion
-
 from tests.core.markers.small_chain import HINGE, SKELETON, random_poses, small_chain
 
 ARM = 2

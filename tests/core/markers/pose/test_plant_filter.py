@@ -7,9 +7,9 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.pose.plant_filter import plant_filter, stances
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, pose_kinematics
+from beyond_mocap.synthetic.gait import gait
 
 FPS = 200.0
 

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.markers.pose import pose
 from beyond_mocap.markers.model.joint_freedom import freedom_of
 from beyond_mocap.markers.model.model import MarkerModel
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
+from beyond_mocap.markers.pose import pose
 from beyond_mocap.markers.pose.pose import HeldBall, PoseSettings, solve
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 
 
 def model_of(known):

@@ -8,7 +8,6 @@ from beyond_mocap.markers.pose.chain import place, poses
 from beyond_mocap.markers.pose.descent import HeldPoint, Task, descend
 from beyond_mocap.markers.pose.smooth import smooth
 from beyond_mocap.motion import quaternion
-
 from tests.core.markers.small_chain import HINGE, SKELETON, small_chain
 
 FPS = 100.0

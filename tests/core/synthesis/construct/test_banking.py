@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import place, pose_kinematics
 from beyond_mocap.synthesis.construct.banking import LEGS, MOST_LEAN, TRUNK, banked, missing_lean
+from beyond_mocap.synthetic.gait import gait
 
 FPS, COUNT = 30.0, 90
 NO_SEAM = np.zeros(0, int)

@@ -4,11 +4,18 @@ between."""
 import numpy as np
 import pytest
 
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.synthesis.construct.ball.carry import (
-    LEAST_ANGLE, MOST_ANGLE, Body, Resting, leg, limb_carried, swing_to, swung,
+    LEAST_ANGLE,
+    MOST_ANGLE,
+    Body,
+    Resting,
+    leg,
+    limb_carried,
+    swing_to,
+    swung,
 )
+from beyond_mocap.synthetic.gait import gait
 
 MOST = np.radians(35.0)
 AT = 12

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.ball_contact import surfaces
+from beyond_mocap.annotation.striking import ball_gap
+from beyond_mocap.ball.roll import ROLLING, rolls, speeds_of
 from beyond_mocap.motion.contacts import detect
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.motion.track import BALL_RADIUS
 from beyond_mocap.synthesis.construct.ball.dribble import dribble
 from beyond_mocap.synthesis.construct.ball.meeting import lead, led
-from beyond_mocap.ball.roll import ROLLING, rolls, speeds_of
+from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.construct.gaze import MOST_YAW, following, head_angles
 from beyond_mocap.synthesis.construct.pins import look_axis
+from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import place, pose_kinematics
 from beyond_mocap.synthesis.construct.give import give
+from beyond_mocap.synthetic.gait import gait
 
 
 @pytest.fixture(scope="module")

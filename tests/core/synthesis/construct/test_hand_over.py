@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import contacts, quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.synthesis.construct.hand_over import handed_over, old_share
+from beyond_mocap.synthetic.gait import gait
 
 STRETCH, HAND = (40, 80), 12
 

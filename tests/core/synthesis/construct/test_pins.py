@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.construct.pins import FADE, MOST_SHIFT, look_axis, pinned
+from beyond_mocap.synthetic.gait import gait
 
 
 @pytest.fixture(scope="module")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthetic.gait import gait
+from beyond_mocap.motion.foot_plant import plant
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.motion.track import zero_phase_hann
-from beyond_mocap.motion.foot_plant import plant
 from beyond_mocap.synthesis.construct.steps import APART, LIFT, steps
+from beyond_mocap.synthetic.gait import gait
 
 FPS, COUNT = 30.0, 300
 STANDING = np.ones((COUNT, 2, 2), bool)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.ball_contact import surfaces
-from beyond_mocap.synthetic import gestures
+from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.motion.contacts import detect
-from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.synthesis.construct.ball.strike import BALL_NOISE, MOST_DROP, MOST_MOVED, Touch, strike
+from beyond_mocap.synthetic import gestures
+from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0
 ENTRY = 8.0

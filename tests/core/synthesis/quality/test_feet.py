@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.quality import feet
-from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.retargeting.adult import adult_skeleton
+from beyond_mocap.synthesis.quality import feet
 
 FPS = 30.0
 STANCE, SWING = 12, 8

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.quality import root
 from beyond_mocap.motion.track import Track
+from beyond_mocap.synthesis.quality import root
 
 FPS = 30.0
 

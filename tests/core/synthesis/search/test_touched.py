@@ -6,7 +6,12 @@ import pytest
 from beyond_mocap.synthesis.search.offer import SLOT
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.touched import (
-    RUN_UP, asked_otherwise, kept_keys, lies_elsewhere, stretches, to_search,
+    RUN_UP,
+    asked_otherwise,
+    kept_keys,
+    lies_elsewhere,
+    stretches,
+    to_search,
 )
 
 

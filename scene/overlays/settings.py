@@ -5,7 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import StringProperty
 
-from .properties import with_settings
+from ..core import window
+from ..core.properties import with_settings
+from . import store
 
 OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "ghosts")
 """The overlays, in the order in which they are drawn and listed."""
@@ -16,9 +18,6 @@ PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "
 
 def _changed(_settings, context):
     """Let what is missing be prepared and the views be drawn again."""
-    from . import window
-    from ..overlays import store
-
     if context.scene is not None and not bpy.app.background:
         store.sync(context.scene)
         window.redraw()
