@@ -6,8 +6,10 @@ In a process of its own, because the add-on leaves things behind in 4.5 with whi
 import os
 import sys
 
-import addon_utils  # bpy brings it
 import bpy
+
+# isort: split
+import addon_utils  # bpy brings it
 
 bpy.ops.wm.read_homefile(use_empty=True)
 addon_utils.enable("rigify", default_set=True)
