@@ -25,8 +25,10 @@ _repository.mkdir(parents=True)
 (_repository / "beyond_mocap").symlink_to(SOURCE, target_is_directory=True)
 sys.modules["beyond_mocap"] = None
 
-import addon_utils  # noqa: E402  (bpy brings it)
 import bpy  # noqa: E402
+
+# isort: split
+import addon_utils  # noqa: E402  (bpy brings it)
 
 
 @atexit.register
