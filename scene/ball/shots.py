@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import bpy
@@ -207,8 +207,8 @@ def _timed(strikes: "Strikes", wish: Wish, fps: float) -> tuple["Strikes", np.nd
     if not early.any():
         expected = f"a frame behind the strike ({strikes.frames[0]})"
         raise InputError("aim", f"arrival on frame {wish.arrival}", expected, "set Frame")
-    kept = (getattr(strikes, name)[early] for name in ("frames", "start", "end"))
-    return type(strikes)(*kept, strikes.radius, strikes.velocity[early]), seconds[early]
+    kept = {name: getattr(strikes, name)[early] for name in ("frames", "start", "end", "velocity")}
+    return replace(strikes, **kept), seconds[early]
 
 
 def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
