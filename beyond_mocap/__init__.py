@@ -1,17 +1,7 @@
-"""Beyond Mocap's core: from dots, a folder of motion capture and a few words to moving bodies.
+"""Beyond Mocap's core: from tracking data, a folder of motion capture and a few labels to full-body animation.
 
-The way through is `import -> library -> annotate -> synthesize -> polish -> bake`, and the rooms stand in that order:
-
-- `motion`      what a movement is: quaternions, skeletons, motions, tracks, contacts, mirroring
-- `markers`     from optical markers to a skeleton
-- `files`       what enters or leaves by disk, converted once at the border
-- `annotation`  the shared language: vocabulary, timelines, their text form
-- `library`     what we choose from: clips, words, features, clusters
-- `plan`, `take` what is asked and what came out
-- `synthesis`   how we choose: blocks of frames, dynamic programming, costs
-- `synthesis`   plan, search, construction and edits
-- `evaluation`  how good it is: every figure of the report
-- `synthesize`  the recipe that walks through all rooms once
+A folder for each feature over a small shared base; docs/architecture.md has the rooms, what each is for and who may
+import whom. The main road: `files` and `library` in, `synthesis` (plan, resolve, search, construct), `evaluation` out.
 
 Units and frames everywhere inside: metres, seconds, radians; Z up, X forward along the pitch's length, Y to its left;
 quaternions (w, x, y, z), unit and sign-continuous; arrays (frame, joint, component) with free leading axes.

@@ -149,7 +149,7 @@ def guard(name: str, action: Callable[[], Any], otherwise: Any = None) -> Any:
     try:
         return action()
     except Exception as error:  # a timer that raises is never called again
-        _report(name, error)
+        _report(f"{name} has failed", error)
         return otherwise
 
 
@@ -226,11 +226,11 @@ def _handler(what: str, count: int) -> Callable:
     return call
 
 
-def _report(name: str, error: Exception) -> None:
-    """Tell the panel that something has failed, and print where; the same is printed once."""
+def _report(failed: str, error: Exception) -> None:
+    """Tell the panel that something `failed`, and print where; the same is printed once."""
     places = traceback.extract_tb(error.__traceback__)
-    seen = (name, type(error), places[-1].filename, places[-1].lineno)
+    seen = (failed, type(error), places[-1].filename, places[-1].lineno)
     if seen not in _reported:
         _reported.add(seen)
         traceback.print_exception(error)
-    bpy.context.window_manager.beyond_mocap_work.trouble = f"{name} has failed; see the system console"
+    bpy.context.window_manager.beyond_mocap_work.trouble = f"{failed}; see the system console"

@@ -238,6 +238,6 @@ def _text(context, where: Vector, lines, strength: float, shift: tuple[float, fl
     legend.write(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
 
 
-WATCHER = Watcher(name="Overlays", ends=free, draws=(
+WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=(
     (bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"), (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL"),
 ))
