@@ -87,9 +87,9 @@ def test_what_is_not_set_is_left_to_the_core(core):
     order = core("match.order").MatchOrder
     values = import_module(f"{EXTENSION}.scene.core.properties").property_values
     match = bpy.context.scene.beyond_mocap_match
-    assert not {"start", "end", "workers"} & set(values(order, match, "match.section", "match.pieces.work"))
+    assert not {"start", "end", "workers"} & set(values(order, match, "match.section", "match.work"))
     match.end, match.workers = 12.5, 3
-    found = values(order, match, "match.section", "match.pieces.work")
+    found = values(order, match, "match.section", "match.work")
     assert (found["end"], found["workers"]) == (12.5, 3)
 
 
