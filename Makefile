@@ -49,15 +49,15 @@ test: venv venv-oldest training
 	  $(MAKE) -s $$1 || status=1; wait $$second || status=1; cat build/$$2.txt; \
 	done; exit $$status
 
-# One room's folders, tests/core/ROOM and tests/blender/ROOM, and files, test_ROOM*.py; the second has settings of its own.
-ROOM_OF = $(wildcard tests/$(1)/$(ROOM) tests/$(1)/*/$(ROOM) tests/$(1)/test_$(ROOM).py tests/$(1)/test_$(ROOM)_*.py)
-ROOMS = $(sort $(filter-out __pycache__,$(notdir $(patsubst %/,%,$(wildcard tests/core/*/ tests/blender/*/))) \
-  $(patsubst test_%.py,%,$(notdir $(wildcard tests/core/test_*.py tests/blender/test_*.py)))))
 lint: venv
 	@packaging/venv.sh lint
 	.venv-lint/bin/ruff check .
 	.venv-lint/bin/mypy --python-executable .venv/bin/python
 
+# One room's folders, tests/core/ROOM and tests/blender/ROOM, and files, test_ROOM*.py; the second has settings of its own.
+ROOM_OF = $(wildcard tests/$(1)/$(ROOM) tests/$(1)/*/$(ROOM) tests/$(1)/test_$(ROOM).py tests/$(1)/test_$(ROOM)_*.py)
+ROOMS = $(sort $(filter-out __pycache__,$(notdir $(patsubst %/,%,$(wildcard tests/core/*/ tests/blender/*/))) \
+  $(patsubst test_%.py,%,$(notdir $(wildcard tests/core/test_*.py tests/blender/test_*.py)))))
 quick: export OPENBLAS_NUM_THREADS = 1
 quick: export OMP_NUM_THREADS = 1
 quick: venv

@@ -29,21 +29,6 @@ def planted_examples(count=12, seed=0, fps=30.0):
     return tuple(found)
 
 
-def planted_kicks(count=5, seed=0, fps=30.0):
-    """Made kicks of one body at known targets, in the normalised frame."""
-    random, found = np.random.default_rng(seed), []
-    while len(found) < count:
-        target = (random.uniform(9, 16), 0.0, random.uniform(0.3, 1.2))
-        try:
-            made = kick(target, random.uniform(18, 24), fps=120.0)
-        except InputError:
-            continue
-        span = (made.contact - 1.0, made.contact + 0.7)
-        found.append(example_of(f"kick{len(found)}", "one", made.motion, "right_foot", made.contact, target,
-                                made.velocity, fps, span))  # fmt: skip
-    return tuple(found)
-
-
 def linear_model(examples, action="throw", ridge=1.0):
     """The hierarchy that answers by ridge regression on the examples."""
     rows = training_set(examples, ModelSettings(points=1, layers=1, units=1, action=action))
@@ -72,8 +57,6 @@ def _linear(rows, units, ridge):
 
 def planted_kicks(count=5, seed=0, fps=30.0):
     """Made kicks of one body at known targets, in the normalised frame."""
-    from beyond_mocap.throws.made_kicks import kick
-
     random, found = np.random.default_rng(seed), []
     while len(found) < count:
         speed, far, high = random.uniform(14, 24), random.uniform(9, 22), random.uniform(0.3, 1.6)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from ...library.library import Library
 from ...motion.foot_plant import Planted
 from ...motion.humanoid import identify
@@ -88,4 +89,4 @@ def _torso(library: Library, pose: np.ndarray) -> np.ndarray:
     top = body.neck if body.neck is not None else body.chest
     places, _ = pose_kinematics(library.skeleton, np.zeros((len(pose), 3)), pose)
     torso = places[:, top] - places[:, body.hips]
-    return torso / np.maximum(np.linalg.norm(torso, axis=1, keepdims=True), 1e-9)
+    return unit_vectors(torso)
