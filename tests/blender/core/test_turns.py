@@ -15,9 +15,13 @@ class Windows:
     """Stands in for the window manager of a Blender with one window."""
 
     def __init__(self):
-        self.beyond_mocap_work = bpy.context.window_manager.beyond_mocap_work
         self.holding = []
         self.scene = None
+
+    @property
+    def beyond_mocap_work(self):
+        """Asked for each time: what Blender gave before the extension was switched off is freed memory after it."""
+        return bpy.context.window_manager.beyond_mocap_work
 
     @property
     def windows(self):
