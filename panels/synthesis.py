@@ -81,7 +81,5 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         header.label(text="Fine Tuning")
         if not body:
             return
-        body.prop(settings, "alpha", slider=True)
-        own = {"path": ("root_window", "made"), "distance": ("delta",)}.get(settings.method, ())
-        for name in ("omega", "gaits", "track_window", "seam_window", *own):
-            body.prop(settings, name)
+        for name in settings.list_tuning():
+            body.prop(settings, name, slider=name == "alpha")

@@ -205,8 +205,8 @@ class _Body:
                 words[frame] = None
         allowed = np.ones(len(library.clips), bool)
         avoided = tuple(strikes for _ in words) if strikes else ()
-        return Wanted(track=track, asked=tuple(words), gait=gait, timeline=Timeline(), keys=keys, allowed=allowed,
-                      warnings=(), avoided=avoided)
+        return Wanted(plan=self._plan(track), track=track, asked=tuple(words), gait=gait, timeline=Timeline(),
+                      keys=keys, allowed=allowed, warnings=(), avoided=avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
         order = hit.order

@@ -5,13 +5,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..annotation import Timeline
 from ..base.errors import InputError, told_time
 from ..base.settings import defaults, rows_of, setting
-from ..base.settings.setting import check_limits
+from ..base.settings.setting import LATER, add_fields, check_limits
 from ..motion.skeleton import frozen_array
 from ..motion.track import SampledTrack, Track, sample
 
@@ -21,8 +22,6 @@ METHODS = setting("synthesis", "method").choice_names
 _DEFAULTS = defaults("synthesis", "player")
 _HEIGHT = setting("player", "height")
 
-LATER = {"later": True}
-"""Marks fields that came after files were saved with fingerprints of the others."""
 
 @dataclass(frozen=True)
 class Pin:
@@ -88,8 +87,10 @@ class SolvedCourse:
 
 
 @dataclass(frozen=True)
+@add_fields(rows_of("synthesis"))
 class Plan:
-    """One player's order. The fields with a default of the settings table mean what is said there.
+    """One player's order. The fields with a default of the settings table mean what is said there; settings of
+    "synthesis" that are not spelled out here are fields all the same.
 
     track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it. timeline: the
     asked annotations (`annotation.read_timeline`), not yet filled. library: folder of the library. pins: where hands,
@@ -98,11 +99,9 @@ class Plan:
     solved: the ball's course where it is known already, such as from a whole match.
 
     Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.balance`), delta §3.2.4, omega and
-    gaits
-    §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`, track_window
-    `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error is always
-    measured
-    with a root_window of 1.5.
+    gaits §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`,
+    track_window `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error
+    is always measured with a root_window of 1.5.
 
     InputError for a number outside the limits of its setting, and for two pins of one part at one time.
     """
@@ -146,6 +145,11 @@ class Plan:
         if self.strong_foot not in FEET:
             raise InputError("strong foot", repr(self.strong_foot), "left, right, or nothing for any")
         self._check_pins()
+
+    if TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            """The settings that are not spelled out."""
 
     def sampled(self, fps: float) -> SampledTrack:
         """The track at `fps` frames per second, as `sample_with_course` has it."""

@@ -17,6 +17,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ...beyond_mocap.base.settings import rows_of
 from ..overlays.settings import BeyondMocapView
 from ..player.pins import BeyondMocapPin
 from ..result.result import BeyondMocapResult, BeyondMocapShared
@@ -128,6 +129,10 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     video: PointerProperty(type=BeyondMocapVideo, description="The reference video")
     shared: PointerProperty(type=BeyondMocapShared, description="What all players' previews have in common")
     view: PointerProperty(type=BeyondMocapView, description="What is drawn over the 3D view")
+
+    def list_tuning(self) -> list[str]:
+        """Names of the settings that the panel lists under Fine Tuning."""
+        return [row.identifier for row in rows_of("synthesis") if row.tuning in ("any", self.method)]
 
 
 class BeyondMocapWork(bpy.types.PropertyGroup):

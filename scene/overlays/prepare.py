@@ -241,15 +241,15 @@ def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
 
 def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
     """Why a piece was chosen, in a few lines."""
-    from ...beyond_mocap.synthesis.search.why import PARTS
+    from ...beyond_mocap.synthesis.search.path_costs import TERMS
 
     lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
     lines.append(
         f"cost {reason.cost:.2f}" + (f", {sum(reason.seam.values()):.2f} of it for the cut" if reason.seam else "")
     )
-    both = {part: reason.costs.get(part, 0.0) + reason.seam.get(part, 0.0) for part in PARTS}
+    both = {part: reason.costs.get(part, 0.0) + reason.seam.get(part, 0.0) for part in TERMS}
     dear = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
-    lines += [f"{value:.2f}  {PARTS[part]}" for part, value in dear]
+    lines += [f"{value:.2f}  {TERMS[part]}" for part, value in dear]
     if reason.others:
         lines.append("next at its start:")
         lines += [f"{other.more:+.2f}  {short(other.path, other.mirrored)}" for other in reason.others]

@@ -10,6 +10,8 @@ from ..errors import InputError
 
 BETWEEN = "between {least} and {most}"
 WHOLE = "a whole number from {least} to {most}"
+LATER = {"later": True}
+"""Marks fields that came after files were saved with fingerprints of the others."""
 POSITIVE: dict[str, Any] = {"least": 1e-9, "most": 1e6, "unit": "metres", "expected": "a positive number"}
 
 
@@ -29,7 +31,8 @@ class Setting:
             `default`, `least`, `most` where they differ there.
         tooltip: of the property in Blender, "" for none; title: None for the name; identifier: "" for the name;
             precision: decimals; panel_more: further arguments of bpy's; `default`, `min`, `max` where they differ.
-        in_preset: whether presets store it.
+        in_preset: whether presets store it. tuning: the method under whose Fine Tuning the panel lists it, "any": under
+            every one's; "" for none.
         blank: the choice that is "" in code; convert: from what a user said to the value that code reads.
         feature: set by the table.
     """
@@ -52,6 +55,7 @@ class Setting:
     precision: int | None = None
     panel_more: Mapping = field(default_factory=dict)
     in_preset: bool = False
+    tuning: str = ""
     blank: str | None = None
     convert: Callable | None = None
     feature: str = ""
@@ -81,6 +85,22 @@ class Setting:
             return ""
         found = tuple(said) if self.kind is tuple else said
         return self.convert(found) if self.convert else found
+
+
+def add_fields(rows: Iterable[Setting]) -> Callable[[type], type]:
+    """Make a class decorator, to stand under `dataclass`: a field for each of `rows` that the class does not spell out.
+
+    The fields are marked as later ones: what was saved before there was the setting stays up to date.
+    """
+
+    def add(cls: type) -> type:
+        for row in rows:
+            if row.name not in cls.__annotations__:
+                cls.__annotations__[row.name] = row.kind.__name__ if row.kind else "Any"
+                setattr(cls, row.name, field(default=row.default, metadata=LATER))
+        return cls
+
+    return add
 
 
 def check_limits(record: Any, rows: Iterable[Setting]) -> None:

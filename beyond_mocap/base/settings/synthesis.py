@@ -53,40 +53,40 @@ TABLES = {
             "physics has it, and is dribbled step by step", in_preset=True),
         Setting(name="alpha", default=0.2, least=0.0, most=1.0, expected=BETWEEN, option="--alpha", metavar="SHARE",
             help="words against continuity; default %(default)g", title="Word Weight", tooltip="Words asked for "
-            "against smooth transitions: 0 looks only for these, 1 only for the words", in_preset=True),
+            "against smooth transitions: 0 looks only for these, 1 only for the words", in_preset=True, tuning="any"),
         Setting(name="delta", default=0.5, least=0.0, most=100.0, unit="metres", expected=BETWEEN, option="--delta",
             help="travelled distance that may stay wrong ('distance'); default %(default)g", title="Distance Slack",
             tooltip="Of Distance: travelled distance of a stretch that may stay wrong before steps are added or left "
-            "out", in_preset=True, panel_more=dict(unit="LENGTH", subtype="DISTANCE")),
+            "out", in_preset=True, tuning="distance", panel_more=dict(unit="LENGTH", subtype="DISTANCE")),
         Setting(name="omega", default=0.0, least=0.0, most=100.0, expected=BETWEEN, option="--omega", metavar="NUMBER",
             help="between two gaits' speeds the faster gait begins at 1/omega of the way up; 0: as the recordings are "
             "labelled ('path'), else 4; default %(default)g", title="Gait Threshold", tooltip="Between the speeds of "
             "two gaits the faster one begins at one part in so many of the way up. 0: where the recordings' own labels "
-            "change (Path), else a quarter of the way", precision=1, in_preset=True),
+            "change (Path), else a quarter of the way", precision=1, in_preset=True, tuning="any"),
         Setting(name="seam_window", default=0.8, least=0.0, most=4.0, unit="seconds", expected=BETWEEN,
             option="--seam-window", help="over which the jump at a cut is spread; default %(default)g",
             title="Cut Window", tooltip="Time over which the jump at a cut between two clips is spread",
-            in_preset=True),
+            in_preset=True, tuning="any"),
         Setting(name="track_window", default=1.2, least=0.2, most=5.0, unit="seconds", expected=BETWEEN,
             option="--track-window", help="of the window that takes the jitter out of the track; default %(default)g",
-            tooltip="Window that takes the jitter out of the track", in_preset=True),
+            tooltip="Window that takes the jitter out of the track", in_preset=True, tuning="any"),
         Setting(name="root_window", default=1.5, least=0.2, most=5.0, unit="seconds", expected=BETWEEN,
             option="--root-window", help="of the window behind which the body is on the track ('path'); default "
             "%(default)g", title="Sway Window", tooltip="Of On the path: the body is on the track when both are seen "
-            "through this window; shorter keeps less sway", in_preset=True),
+            "through this window; shorter keeps less sway", in_preset=True, tuning="path"),
         Setting(name="variety", default=0.0, least=0.0, most=10.0, unit="m/s", help="of missed speed that it is worth "
             "not to be in step with neighbours in a match"),
         Setting(name="lag", default=0.0, least=0.0, most=60.0, unit="seconds", help="that a player of a match lags "
             "behind the clock, so that neighbours differ"),
         Setting(name="gaits", default=(), option="--gait", metavar="WORD=CLIP", help="the clip that stands for a gait, "
-            "such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tooltip="Which clip stands for "
-            "which gait, where you choose: walking=folder/walk.bvh; jogging=folder/jog.bvh", convert=gait_choices,
-            option_more=dict(action="append")),
+            "such as walking=folder/walk.bvh; once for each gait", title="Gait Clips", tuning="any",
+            tooltip="Which clip stands for which gait, where you choose: walking=folder/walk.bvh; "
+            "jogging=folder/jog.bvh", convert=gait_choices, option_more=dict(action="append")),
         Setting(name="mirror", default=True, option="--no-mirror", help="do not use mirrored clips",
             title="Mirrored Clips", tooltip="Use each clip also with left and right exchanged", in_preset=True),
         Setting(name="made", default=True, option="--no-made", help="no made or blended clips where recordings lack a "
             "speed", title="Made Clips", tooltip="Of On the path: make or blend clips where recordings lack a speed, "
-            "and kicks on the run", in_preset=True),
+            "and kicks on the run", in_preset=True, tuning="path"),
         Setting(name="nearest", default=False, option="--nearest", help="go on with the nearest words that the library "
             "has", title="Nearest Words", tooltip="Where the library lacks a key moment's words, go on with the "
             "nearest that it has, and say so", in_preset=True),

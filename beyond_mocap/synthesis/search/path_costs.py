@@ -65,6 +65,28 @@ def _promising(cost_of, speeds: np.ndarray, speed: float, weight: float, near: s
     return near, cost_of(near)
 
 
+TERMS = {
+    "speed": "speed other than the track's",
+    "turn": "turning other than the track's",
+    "facing": "facing elsewhere than wanted",
+    "words": "asked words that the clip lacks",
+    "unasked": "an action that nobody asked for, or no words at all",
+    "made": "made clip, not recorded",
+    "rate": "played faster or slower than recorded",
+    "strike": "strikes the ball otherwise than it comes",
+    "pose": "change of pose at the cut",
+    "feet": "standing feet that jump at the cut",
+    "left": "wild motion left at the cut",
+    "cut": "the cut itself, and wild motion entered",
+    "replay": "shown a moment ago",
+    "rate_change": "change of playing speed",
+    "avoided": "a word that must not be",
+    "style": "no clip of the style",
+    "variety": "out of step with this player's own lag",
+}
+"""Name of a part of the costs -> what it is about, as "Why this clip?" says it."""
+
+
 @dataclass(frozen=True)
 class Weights:
     """What a unit of each misfit costs. speed per m/s; drag per m/s and second that both feet stand longer than in a

@@ -25,6 +25,7 @@ from ...library.automatic import automatic_words
 from ...library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ...library.library import Library
 from ...motion.track import SampledTrack
+from ..plan import Plan
 from ..resolved_plan import ResolvedPlan
 from .style import off_style_cost
 from .variety import Taste, taste
@@ -50,14 +51,15 @@ class WantedKey:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Wanted:
-    """track: the player at the library's rate. asked: per frame the wanted words, None where continuity alone counts.
-    avoided: per frame the words that what is shown may not carry; empty where all may be shown throughout. off_style:
-    (N,) float32 cost per slot of library frames without the style that is asked, None where none is. weak_foot: side of
-    the foot that key moments without a side rather leave, or "". taste: at which times this player rather shows which
-    frames, None where that is all the same. gait: per frame index into the library's gaits.
-    timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the library lacks of what is
-    asked."""
+    """plan: what was asked, with the settings of the costs. track: the player at the library's rate. asked: per frame
+    the wanted words, None where continuity alone counts. avoided: per frame the words that what is shown may not carry;
+    empty where all may be shown throughout. off_style: (N,) float32 cost per slot of library frames without the style
+    that is asked, None where none is. weak_foot: side of the foot that key moments without a side rather leave, or "".
+    taste: at which times this player rather shows which frames, None where that is all the same. gait: per frame index
+    into the library's gaits. timeline: filled. keys: in time order. allowed: (C,) clips to use. warnings: what the
+    library lacks of what is asked."""
 
+    plan: Plan
     track: SampledTrack
     asked: tuple[Words, ...]
     gait: np.ndarray
@@ -107,8 +109,9 @@ def build_order(library: Library, plan: ResolvedPlan) -> Wanted:
     off_style = off_style_cost(library, asked_for.style, asked_for.style_weight, warnings)
     weak_foot = {"left": "right", "right": "left"}.get(asked_for.strong_foot, "")
     own = taste(library, asked_for.lag, asked_for.variety, float(track.times[0]))
-    return Wanted(track=track, asked=tuple(asked), gait=gait, timeline=timeline, keys=keys, allowed=allowed,
-                  warnings=tuple(warnings), avoided=avoided, off_style=off_style, weak_foot=weak_foot, taste=own)
+    return Wanted(plan=asked_for, track=track, asked=tuple(asked), gait=gait, timeline=timeline, keys=keys,
+                  allowed=allowed, warnings=tuple(warnings), avoided=avoided, off_style=off_style,
+                  weak_foot=weak_foot, taste=own)
 
 
 def _other_gaits(library: Library, gait: np.ndarray, speed: np.ndarray, avoided: list[frozenset[str]]) -> np.ndarray:

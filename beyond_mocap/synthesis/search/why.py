@@ -28,27 +28,6 @@ from .slots import Pieces, slot_edges
 from .transition_cost import distances, typical_distance, windows
 from .wanted import Wanted, build_order
 
-PARTS = {
-    "speed": "speed other than the track's",
-    "turn": "turning other than the track's",
-    "facing": "facing elsewhere than wanted",
-    "words": "asked words that the clip lacks",
-    "unasked": "an action that nobody asked for, or no words at all",
-    "made": "made clip, not recorded",
-    "rate": "played faster or slower than recorded",
-    "strike": "strikes the ball otherwise than it comes",
-    "pose": "change of pose at the cut",
-    "feet": "standing feet that jump at the cut",
-    "left": "wild motion left at the cut",
-    "cut": "the cut itself, and wild motion entered",
-    "replay": "shown a moment ago",
-    "rate_change": "change of playing speed",
-    "avoided": "a word that must not be",
-    "style": "no clip of the style",
-    "variety": "out of step with this player's own lag",
-}
-"""Name of a part of the costs -> what it is about."""
-
 NEAREST = 3
 _SHIFTED = 2.0  # library frames: a key moment's piece is moved by less than this to be on time
 

@@ -14,9 +14,9 @@ from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.balance import balanced
 from beyond_mocap.synthesis.search.blocks import BlockSearch
 from beyond_mocap.synthesis.search.distance import exact_keys, straight_edit
-from beyond_mocap.synthesis.search.path_costs import Weights
+from beyond_mocap.synthesis.search.path_costs import TERMS, Weights
 from beyond_mocap.synthesis.search.path_search import PathSearch
-from beyond_mocap.synthesis.search.why import PARTS, block_reasons, explain_choices, reasons
+from beyond_mocap.synthesis.search.why import block_reasons, explain_choices, reasons
 from beyond_mocap.synthesis.synthesize import synthesize
 
 DATA = Path(__file__).resolve().parents[5] / "shared" / "data"
@@ -82,7 +82,7 @@ def test_others_are_other_clips_and_cost_what_they_cost(library, order):
 def test_parts_have_words(library, order):
     asked = order((4.0, "kick"))
     found = reasons(library, asked, PathSearch(library, asked).run(), Weights())
-    assert {name for reason in found for name in (*reason.costs, *reason.seam)} <= set(PARTS)
+    assert {name for reason in found for name in (*reason.costs, *reason.seam)} <= set(TERMS)
 
 
 def test_blocks_tell_words_and_pose(library, order):
