@@ -18,7 +18,7 @@ from beyond_mocap.library.library import Library
 from beyond_mocap.motion.track import clean, sample
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.balance import balanced
+from beyond_mocap.synthesis.search.path_costs import balanced
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.wanted import build_order
 from beyond_mocap.synthesis.search_library import search_library

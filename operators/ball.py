@@ -9,7 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, St
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
-from ..beyond_mocap.base.settings.choices import BALLS, HOLDS, PARTS, SIDES
+from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
 from ..scene.ball.settings import aimed, aimed_ball
 from ..scene.ball.subject import ball_meant, body_meant, stretch_of, target_meant

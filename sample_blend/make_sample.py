@@ -18,8 +18,11 @@ if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  # noqa: E402
-from beyond_mocap.base.runs import equal_runs  # noqa: E402
-from beyond_mocap.base.time_series import hann_smooth, interpolate  # noqa: E402
+from beyond_mocap.base.time_series import (  # noqa: E402
+    equal_runs,  # noqa: E402
+    hann_smooth,
+    interpolate,
+)
 from beyond_mocap.base.vectors import unit_vectors  # noqa: E402
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.motion.motion import Motion  # noqa: E402

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.runs import equal_runs
+from ..base.time_series import equal_runs
 from .labels import list_gaits, list_labels
 
 LOCOMOTION = list_gaits()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arctangent import arctan2
+from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.track import SampledTrack, zero_phase_hann
 from .gaits import without_short_runs

@@ -15,8 +15,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..base.arctangent import arctan2
 from ..base.errors import InputError
+from ..base.vectors import arctan2
 from . import batch
 from .physics import Ball, length
 

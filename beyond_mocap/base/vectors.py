@@ -1,4 +1,4 @@
-"""Vectors: length one, cross products, the way along a line."""
+"""Vectors: length one, cross products, angles, the way along a line."""
 
 from __future__ import annotations
 
@@ -94,3 +94,12 @@ def distance_along(line: np.ndarray) -> np.ndarray:
         (N,), m.
     """
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+
+
+def arctan2(y: np.ndarray, x: np.ndarray) -> np.ndarray:
+    """`numpy.arctan2` in radians of arrays that go together.
+
+    numpy works out a column of a wider array by another formula, up to two units in the last place away, whenever the
+    result happens to lie right behind that array in memory. Contiguous copies never touch what comes out.
+    """
+    return np.arctan2(np.asarray(y, order="C"), np.asarray(x, order="C"))

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.runs import runs
+from ..base.time_series import runs
 from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate

@@ -27,9 +27,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION, ClipAnnotation, gait_thresholds
-from ..base.arctangent import arctan2
-from ..base.runs import equal_runs, runs
-from ..base.vectors import cross
+from ..base.time_series import equal_runs, runs
+from ..base.vectors import arctan2, cross
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant
 from ..motion.humanoid import heading_from_positions, identify

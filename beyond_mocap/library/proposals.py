@@ -25,8 +25,8 @@ from ..annotation.gaits import STANDING, without_short_runs
 from ..annotation.labels import find_label
 from ..annotation.striking import part_surfaces
 from ..annotation.vocabulary import DIRECTIONS
-from ..base.arctangent import arctan2
-from ..base.runs import equal_runs, runs
+from ..base.time_series import equal_runs, runs
+from ..base.vectors import arctan2
 from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.ndimage import minimum_filter1d
 
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.runs import runs
+from ..base.time_series import runs
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import plant
 from ..motion.humanoid import identify

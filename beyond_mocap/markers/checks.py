@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from ..base.errors import InputError, TimedLine
-from ..base.runs import runs
+from ..base.time_series import runs
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
 from .trial import MarkerTrial

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import grey_opening, maximum_filter1d
 
-from ..base.runs import run_numbers, runs
+from ..base.time_series import run_numbers, runs
 from .humanoid import Humanoid, identify, leg_length
 from .motion import Motion, forward_kinematics
 from .skeleton import Skeleton

@@ -16,11 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from ..base.arctangent import arctan2
 from ..base.banded_least_squares import BandedLeastSquares
-from ..base.runs import run_numbers
-from ..base.time_series import hann_smooth
-from ..base.vectors import cross
+from ..base.time_series import hann_smooth, run_numbers
+from ..base.vectors import arctan2, cross
 from . import quaternion
 from .contacts import sole_height
 from .humanoid import Limb, identify

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arctangent import arctan2
-from ..base.vectors import cross, unit_vectors
+from ..base.vectors import arctan2, cross, unit_vectors
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 IDENTITY.setflags(write=False)

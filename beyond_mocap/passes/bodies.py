@@ -19,10 +19,10 @@ from ..annotation.gaze import wanted_offset
 from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
 from ..ball.contact import striking_surface
-from ..base.arctangent import arctan2
 from ..base.easing import smoothstep
 from ..base.errors import InputError, told_time
 from ..base.time_series import interpolate
+from ..base.vectors import arctan2
 from ..library.automatic import automatic_words
 from ..library.keys import Key
 from ..library.library import Library
@@ -36,8 +36,8 @@ from ..synthesis.construct.ball.strike_at import Meeting, Met, met_at
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.gaze import CHEST, following
 from ..synthesis.construct.on_track import STANDS, follow_turning
-from ..synthesis.frame_sources import provenance_fields
 from ..synthesis.plan import Plan
+from ..synthesis.provenance import provenance_fields
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.footage import Footage, fetch
 from ..synthesis.search.path_costs import Alike

@@ -16,9 +16,8 @@ import numpy as np
 from ..ball.aim import aim
 from ..ball.batch import courses
 from ..ball.contact import in_world
-from ..base.arctangent import arctan2
 from ..base.errors import InputError
-from ..base.vectors import unit_vectors
+from ..base.vectors import arctan2, unit_vectors
 from ..motion import quaternion
 from .pass_costs import (
     TIMES,

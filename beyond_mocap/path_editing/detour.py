@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.arctangent import arctan2
 from ..base.errors import InputError
+from ..base.vectors import arctan2
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
 

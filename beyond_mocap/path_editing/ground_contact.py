@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.easing import quintic_step_by_powers
-from ..base.runs import runs
-from ..base.time_series import interpolate
+from ..base.time_series import interpolate, runs
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain

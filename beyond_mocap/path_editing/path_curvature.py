@@ -6,11 +6,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import minimum_filter1d
 
-from ..base.arctangent import arctan2
 from ..base.errors import TimedLine
-from ..base.runs import runs
-from ..base.time_series import hann_smooth
-from ..base.vectors import cross_level
+from ..base.time_series import hann_smooth, runs
+from ..base.vectors import arctan2, cross_level
 from ..motion.path.path import Path
 
 TIGHT = 0.3

@@ -11,9 +11,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from ..base.arctangent import arctan2
 from ..base.banded_least_squares import BandedLeastSquares
 from ..base.errors import InputError
+from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann

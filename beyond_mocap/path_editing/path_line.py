@@ -7,8 +7,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.errors import InputError
-from ..base.runs import runs
-from ..base.time_series import interpolate
+from ..base.time_series import interpolate, runs
 from ..base.vectors import distance_along, unit_vectors
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath

@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from ..base.errors import InputError, TimedLine
-from ..base.runs import runs
 from ..base.settings import defaults, setting
+from ..base.time_series import runs
 from ..motion import contacts, quaternion
 from ..motion.foot_plant import Planted
 from ..motion.humanoid import heading as facing

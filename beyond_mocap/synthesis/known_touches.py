@@ -23,8 +23,7 @@ from ..motion.track import BALL_RADIUS
 from .construct.ball.dribble import dribble
 from .construct.ball.meeting import led, lofted
 from .construct.ball.strike import held_frames
-from .plan import Plan, SolvedCourse, Touched
-from .resolved_plan import ResolvedPlan
+from .plan import Plan, ResolvedPlan, SolvedCourse, Touched
 from .take import DribbleTouch, KeyResult, Take
 
 FURTHEST = 0.4

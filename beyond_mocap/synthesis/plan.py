@@ -1,5 +1,5 @@
-"""What is asked: a plan names the track, the timeline, the ball, pins and the library's folder,
-and how to go about it."""
+"""What is asked (`Plan`: track, timeline, ball, pins, library and how to go about it), and the same resolved for a
+library, as search, construction, edits and explanations need it (`ResolvedPlan`, made by `resolve_plan`)."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Plan:
     clips. strong_foot: one of FEET. style: words, or names or patterns of folders and clips ("academy", "lmd/*").
     solved: the ball's course where it is known already, such as from a whole match.
 
-    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.balance`), delta §3.2.4, omega and
+    Source: Faustino, catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega and
     gaits §3.1.1, seam_window eq. 25 (twice its s; "path" fades over half of it). Others: made `library.made`,
     track_window `motion.track.smoothed`, solve_touches `known_touches`, lag `match.crowd.variety.lags`; the root error
     is always measured with a root_window of 1.5.
@@ -180,3 +180,38 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
         sampled, ball=np.where(known[:, None] & (~measured[:, None] | [False, False, True]), ball, sampled.ball),
         ball_measured=measured,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ResolvedPlan:
+    """A plan with its touches solved, in the size of the library's skeleton.
+
+    asked: the plan as it was asked; its settings hold as they are, its pins are in the player's size.
+    timeline: the asked annotations, not yet filled, with key moments at the touches that they mean.
+    track: the player's samples, m in the library's size.
+    course: the solved course of the ball, m in the player's size; None where it is not solved.
+    size: how many times as tall as the library's skeleton the player is.
+    """
+
+    asked: Plan
+    timeline: Timeline
+    track: Track
+    course: SolvedCourse | None
+    size: float
+
+    @property
+    def method(self) -> str:
+        """The method of the search, one of `plan.METHODS`."""
+        return self.asked.method
+
+    @property
+    def fps(self) -> float:
+        """Output frames per second."""
+        return self.asked.fps
+
+    def sampled(self, fps: float) -> SampledTrack:
+        """The track at `fps` frames per second, with the solved ball, in the library's size."""
+        course = self.course
+        if course is not None and self.size != 1.0:
+            course = replace(course, ball=course.ball / self.size)
+        return sample_with_course(self.track, course, fps, self.asked.track_window)

@@ -1,15 +1,19 @@
-"""Provenance: which clip, at which frame, every frame of a take shows; and its table."""
+"""Provenance: which clip, at which frame, every frame of a take shows, and how that is written as a table."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from ..annotation import spoken
 from ..files.tables import format_csv, parse_column, parse_flags, read_rows
 from ..files.whole import atomic_write
+from ..library.library import Library
 from ..motion.skeleton import frozen_array
+from .search.footage import Shown
 from .take import Take
 
 PROVENANCE_COLUMNS = (
@@ -75,3 +79,30 @@ def read_provenance(path: str | os.PathLike) -> Provenance:
         words=tuple(tuple(row["labels"].split()) for _, row in rows),
         contacts=np.column_stack([parse_flags(rows, "contact_left"), parse_flags(rows, "contact_right")]),
     )
+
+
+def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
+    """The fields of a `Take` that say what its frames show: clips, clip, clip_frame, mirrored, words and seams."""
+    sources = sources_shown(library, shown)
+    names = tuple(dict.fromkeys(sources))
+    number = {name: i for i, name in enumerate(names)}
+    return {
+        "clips": names,
+        "clip": np.array([number[source] for source in sources]),
+        "clip_frame": shown.clip_frame,
+        "mirrored": np.array([library.clips[clip].mirrored for clip in shown.clip]),
+        "words": words_shown(library, shown),
+        "seams": shown.seams,
+    }
+
+
+def sources_shown(library: Library, shown: Shown) -> tuple[str, ...]:
+    """The files, below the library, that hold every shown frame: recordings, or what was made behind their end."""
+    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
+    return tuple(library.clips[clip].source_at(frame) for clip, frame in frames)
+
+
+def words_shown(library: Library, shown: Shown) -> tuple[tuple[str, ...], ...]:
+    """The words that every shown frame's clip carries there."""
+    frames = zip(shown.clip, np.round(shown.clip_frame, 6))
+    return tuple(spoken(library.clips[clip].words_at(frame)) for clip, frame in frames)

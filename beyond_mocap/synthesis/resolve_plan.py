@@ -15,8 +15,7 @@ from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.track import Track
 from .known_touches import solve_touches
-from .plan import Plan, SolvedCourse
-from .resolved_plan import ResolvedPlan
+from .plan import Plan, ResolvedPlan, SolvedCourse
 
 
 def resolve_plan(

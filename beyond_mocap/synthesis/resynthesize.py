@@ -30,18 +30,17 @@ from .construct.hand_over import handed_over, old_share
 from .construct.key_moments import find_touches, key_results
 from .construct.old_motion import OldMotion
 from .construct.smoothing import reaches
-from .frame_sources import sources_shown, words_shown
 from .own_size import taken_in_library_size
-from .plan import Plan
+from .plan import Plan, ResolvedPlan
+from .provenance import sources_shown, words_shown
 from .resolve_plan import resolve_plan
-from .resolved_plan import ResolvedPlan
-from .search.balance import balanced
 from .search.edit_list import EditList
 from .search.footage import Shown, fetch, output_index, shown
 from .search.offer import SLOT
+from .search.path_costs import balanced
 from .search.path_search import Between, PathSearch
+from .search.preferences import Used, used_in
 from .search.touched import Stretch, asked_anew, joined, kept_keys, lies_elsewhere, stretches, to_search
-from .search.used import Used, used_in
 from .search.wanted import Wanted, build_order
 from .search_library import search_library
 from .synthesize import Progress, finished, synthesize

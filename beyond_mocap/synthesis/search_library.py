@@ -10,7 +10,7 @@ from ..annotation.ball_contact import takes_with_foot
 from ..library.chosen import with_chosen_gaits
 from ..library.library import Library
 from ..motion.track import sample
-from .resolved_plan import ResolvedPlan
+from .plan import ResolvedPlan
 from .search.edit_list import EditList
 
 

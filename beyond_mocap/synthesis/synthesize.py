@@ -21,7 +21,7 @@ import numpy as np
 
 from ..annotation import LOCOMOTION_WORDS, avoided_per_frame
 from ..base.errors import InputError, TimedLine, told_time
-from ..base.runs import runs
+from ..base.time_series import runs
 from ..library.library import Library
 from ..motion.foot_plant import Planted
 from ..motion.motion import Motion, at_frames
@@ -31,23 +31,22 @@ from .construct.key_moments import find_touches, key_results
 from .construct.pins import look_axis, pinned
 from .construct.steps import Steps
 from .construct.thesis_methods import lay_out_blocks
-from .frame_sources import provenance_fields
 from .known_touches import untouched, with_course
 from .own_size import in_own_size
-from .plan import METHODS, Plan
+from .plan import METHODS, Plan, ResolvedPlan
+from .provenance import provenance_fields
 from .quality.give_way import give_way
 from .quality.played import played_from_take
 from .resolve_plan import resolve_plan
-from .resolved_plan import ResolvedPlan
-from .search.balance import balanced
 from .search.blocks import BlockSearch
 from .search.distance import exact_keys, straight_edit, warped_edit
 from .search.dragged import left_out
 from .search.edit_list import EditList
 from .search.footage import fetch, output_index
 from .search.locomotion import match_distance
+from .search.path_costs import balanced
 from .search.path_search import PathSearch
-from .search.used import Used
+from .search.preferences import Used
 from .search.wanted import Wanted, build_order
 from .search_library import search_library
 from .take import PinResult, Take

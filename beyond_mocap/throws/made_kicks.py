@@ -13,9 +13,9 @@ import numpy as np
 from ..annotation.striking import FOOT_RADIUS
 from ..ball.physics import FOOTBALL, Ball
 from ..ball.wall import meets_wall
-from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..base.time_series import interpolate
+from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.motion import Motion, place
 from ..motion.retargeting.adult import LEG, adult_skeleton

@@ -29,12 +29,11 @@ from ..motion.track import SampledTrack, Track, zero_phase_hann
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.key_moments import find_touches, key_results
 from ..synthesis.known_touches import solve_touches
-from ..synthesis.plan import Plan
+from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan
-from ..synthesis.resolved_plan import ResolvedPlan
-from ..synthesis.search.balance import balanced
 from ..synthesis.search.edit_list import EditList
 from ..synthesis.search.footage import Footage, fetch, output_index
+from ..synthesis.search.path_costs import balanced
 from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.wanted import Wanted, build_order
 from ..synthesis.search_library import search_library

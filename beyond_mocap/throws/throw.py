@@ -19,8 +19,8 @@ from ..ball.arcs import arcs, out_of_reach
 from ..ball.flight import Flight, Launch, fly
 from ..ball.impact import crossing
 from ..ball.physics import BALLS, FASTEST, THROWN, Ball
-from ..base.arctangent import arctan2
 from ..base.errors import InputError
+from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify, stature

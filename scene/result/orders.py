@@ -192,7 +192,7 @@ def _again(clips, plan: Plan, steps: list[dict], asked) -> Take:
 
 
 def _pieces(step: dict) -> tuple:
-    from ...beyond_mocap.synthesis.search.used import Used
+    from ...beyond_mocap.synthesis.search.preferences import Used
 
     return tuple(Used(**piece) for piece in step.get("used", ()))
 

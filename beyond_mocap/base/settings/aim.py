@@ -1,8 +1,7 @@
 """Settings of an aimed ball."""
 # fmt: off
 
-from .choices import BALLS, PARTS, SIDES
-from .setting import Setting
+from .setting import BALLS, PARTS, SIDES, Setting
 
 WAYS = (
     ("AIR", "Air", "It flies, and bounces as often as asked"),

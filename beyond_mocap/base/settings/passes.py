@@ -1,8 +1,7 @@
 """Settings of passing scenes, of balls that are carried, and of hit analysis."""
 # fmt: off
 
-from .choices import BALLS, EITHER, HOLDS, PARTS, SIDES
-from .setting import Setting
+from .setting import BALLS, EITHER, HOLDS, PARTS, SIDES, Setting
 
 KINDS = (
     ("toss", "Toss", "Slow, to somebody near"), ("pass", "Pass", "At a medium speed"),

@@ -1,8 +1,7 @@
 """Settings of live streams."""
 # fmt: off
 
-from .choices import EITHER, PARTS
-from .setting import Setting
+from .setting import EITHER, PARTS, Setting
 
 PROTOCOLS = (
     ("udp", "UDP", "Frames come as datagrams"), ("tcp", "TCP", "Who sends connects to this port"),

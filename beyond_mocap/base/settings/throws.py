@@ -3,8 +3,7 @@
 
 from pathlib import Path
 
-from .choices import SIDES
-from .setting import Setting
+from .setting import SIDES, Setting
 
 KINDS = (
     ("usual", "Usual", "A baseball for throws, a football for kicks"), ("baseball", "Baseball", "73 mm, 145 g"),

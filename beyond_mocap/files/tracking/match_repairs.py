@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...motion.track import FASTEST, at_sentinel
 
 _BESIDE = 12.0  # m beyond the lines, where nobody plays

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...motion.motion import Motion
 from ..proposal import LEARNED, Proposal
 from . import confidence

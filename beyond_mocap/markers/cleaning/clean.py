@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import Cancelled, InputError
-from ...base.runs import runs
+from ...base.time_series import runs
 from ..trial import MarkerTrial
 from .carriers import carriers, softness
 from .clean_report import CleanReport, Stretch

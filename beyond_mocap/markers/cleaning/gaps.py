@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.easing import hermite
-from ...base.runs import runs
+from ...base.time_series import runs
 from .carriers import Carried, carried, helpers_of
 from .cluster_shape import Shape, mean_shape
 from .robust import quantile

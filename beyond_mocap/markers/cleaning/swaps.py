@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 from ..frames import placed, rigid_fit
 from .carriers import Carried
 from .robust import median

@@ -17,8 +17,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.errors import Cancelled, InputError
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
 from ..frames import rigid_fit

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from .chain import Chain, Poses, angles_of, cross, own_axes, within
 from .elimination import Own

@@ -17,7 +17,7 @@ import numpy as np
 
 from ...base.easing import smoothstep
 from ...base.errors import InputError
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import Motion, pose_kinematics

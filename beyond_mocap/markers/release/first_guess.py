@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 
 GROWS = 1.1
 """The ball has left once its marker is that much further from the hand than while held (Fredriksson §6.2)."""

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...motion.motion import Motion
 from .capsules import FAR, capsules, lines, touching
 from .correction import CURVES, Correction, carried

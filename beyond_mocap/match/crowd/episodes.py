@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 
 Span = tuple[int, int, tuple[int, int]]
 """First frame, end, and the numbers of two bodies."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...synthesis.search.variety import PERIOD
+from ...synthesis.search.preferences import PERIOD
 
 NEAR = 10.0
 """Metres between two players within which the same clip in step is seen."""

@@ -10,8 +10,8 @@ from ...library.chosen import with_chosen_gaits
 from ...library.library import Library
 from ...synthesis.plan import Plan
 from ...synthesis.resolve_plan import resolve_plan
-from ...synthesis.search.balance import balanced
 from ...synthesis.search.distance import exact_keys
+from ...synthesis.search.path_costs import balanced
 from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.wanted import build_order
 from .library_clips import named

@@ -13,8 +13,7 @@ from ...library.features import FPS
 from ...library.library import Library
 from ...synthesis.plan import Plan
 from ...synthesis.resolve_plan import resolve_plan
-from ...synthesis.search.balance import balanced
-from ...synthesis.search.path_costs import PathCosts
+from ...synthesis.search.path_costs import PathCosts, balanced
 from ...synthesis.search.slots import AROUND
 from ...synthesis.search.wanted import build_order
 from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept

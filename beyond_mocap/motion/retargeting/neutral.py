@@ -10,8 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arctangent import arctan2
-from ...base.vectors import cross, unit_vectors
+from ...base.vectors import arctan2, cross, unit_vectors
 from .. import quaternion
 from ..humanoid import Humanoid, Limb, heading_from_positions, identify
 from ..motion import Motion, forward_kinematics, local_rotations, pose_kinematics

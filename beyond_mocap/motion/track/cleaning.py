@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError, TimedLine, told_time
-from ...base.runs import runs
+from ...base.time_series import runs
 from .data import Track
 from .sampling import GAP_INTERVALS, LONG_GAP
 from .sentinels import at_sentinel

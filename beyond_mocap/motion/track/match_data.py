@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import InputError
-from ...base.runs import runs
+from ...base.time_series import runs
 from . import Track
 
 LONGEST_GAP = 3.0

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.errors import InputError
 from ...base.time_series import interpolate
+from ...base.vectors import arctan2
 from .data import BALL_RADIUS, SampledTrack, Track
 
 SMOOTHING_SECONDS = 1.2

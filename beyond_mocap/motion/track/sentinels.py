@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.runs import runs
+from ...base.time_series import runs
 
 _PITCH = 200.0  # metres from the centre beyond which no ball is
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.motion import world_rotation

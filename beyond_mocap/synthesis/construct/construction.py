@@ -23,7 +23,7 @@ from ...motion import quaternion
 from ...motion.foot_plant import Planted, plant
 from ...motion.track import SampledTrack
 from ..own_size import real_ball
-from ..resolved_plan import ResolvedPlan
+from ..plan import ResolvedPlan
 from ..search.footage import Footage, overlap
 from .ball.strike import Touch, strike
 from .banking import banked, missing_lean

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.easing import quintic_step
+from ...base.vectors import arctan2
 from ...motion import quaternion
 
 

@@ -12,9 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
-from ...base.vectors import unit_vectors
+from ...base.vectors import arctan2, unit_vectors
 from ...motion import quaternion
 from ...motion.humanoid import heading_from_positions, identify
 from ...motion.motion import Motion, forward_kinematics

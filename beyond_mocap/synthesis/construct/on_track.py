@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.banded_least_squares import BandedLeastSquares
-from ...base.runs import runs
+from ...base.time_series import runs
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.track import zero_phase_hann
 

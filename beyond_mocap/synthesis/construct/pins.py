@@ -14,10 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
-from ...base.runs import runs
-from ...base.vectors import unit_vector
+from ...base.time_series import runs
+from ...base.vectors import arctan2, unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, heading_from_positions, identify
 from ...motion.motion import Motion, pose_kinematics

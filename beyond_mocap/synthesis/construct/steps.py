@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.easing import smoothstep
-from ...base.runs import runs
+from ...base.time_series import runs
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics

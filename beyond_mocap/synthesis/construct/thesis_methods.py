@@ -12,7 +12,7 @@ from ...motion.foot_plant import Planted
 from ...motion.humanoid import identify
 from ...motion.motion import pose_kinematics
 from ...motion.track import SampledTrack
-from ..resolved_plan import ResolvedPlan
+from ..plan import ResolvedPlan
 from ..search.footage import Footage
 from ..search.locomotion import travelled_distance
 from .construction import Construction, apply_heading

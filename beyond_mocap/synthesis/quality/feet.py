@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton

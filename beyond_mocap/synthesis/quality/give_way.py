@@ -14,7 +14,7 @@ import numpy as np
 
 from ...annotation import Timeline, words_per_frame
 from ...base.errors import TimedLine, told_time
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN

@@ -26,9 +26,8 @@ from ...base.errors import Cancelled
 from ...library.clusters import BLOCK_LENGTHS
 from ...library.keys import Key
 from ...library.library import Library
-from .annotation_cost import AnnotationCost
-from .style import weak_foot_cost
-from .transition_cost import distances, typical_distance, windows
+from .block_costs import AnnotationCost, distances, typical_distance, windows
+from .preferences import weak_foot_cost
 from .wanted import Wanted, needed, pool_frame
 
 MOST_CANDIDATES = 600

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...annotation.ball_contact import surfaces
 from ...annotation.striking import faster_middle
-from ...base.arctangent import arctan2
+from ...base.vectors import arctan2
 from ...library.keys import Key
 from ...library.library import Library
 from ...motion import quaternion

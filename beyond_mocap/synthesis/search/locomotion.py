@@ -22,8 +22,8 @@ from ...annotation import LOCOMOTION_WORDS
 from ...base.vectors import distance_along
 from ...library.library import Library
 from ...motion.track import SampledTrack
+from .block_costs import distances, windows
 from .blocks import FINEST, BlockSearch, Candidates
-from .transition_cost import distances, windows
 from .wanted import Wanted
 
 CLOSE = 0.1

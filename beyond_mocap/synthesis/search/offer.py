@@ -9,9 +9,9 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from ...annotation import DISCRETE
-from ...base.arctangent import arctan2
+from ...base.vectors import arctan2
 from ...library.library import Library
-from .annotation_cost import AnnotationCost
+from .block_costs import AnnotationCost
 
 SLOT = 8
 RATES = np.array([0.875, 0.9375, 1.0, 1.0625, 1.125])

@@ -7,14 +7,15 @@ poses are apart. Costs are per slot, about a metre per second of missed speed ea
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...annotation.gaze import wanted_offset
 from ...library.library import Library
+from ..plan import Plan
 from .offer import RATES, SLOT, Offer, Pairs
-from .used import Used, price
+from .preferences import Used, price
 from .wanted import Wanted
 
 # The cheapest of many pairs of a rate and a library frame, without weighing them all.
@@ -27,6 +28,8 @@ _SAMPLED = 8
 # as many pairs as are wanted lie below the cost below which this many times their share of the sample lies
 _ABOVE = 1.25
 _ROUNDING = 1e-3
+
+_CONTINUITY = ("switch", "pose", "rate_change")
 
 
 def cheapest(
@@ -351,3 +354,16 @@ def _between(values: np.ndarray, at: np.ndarray, last: np.ndarray) -> np.ndarray
     low = np.floor(at).astype(int)
     weight = (at - low).reshape(-1, *[1] * (values.ndim - 1))
     return values[low] * (1.0 - weight) + values[np.minimum(low + 1, last)] * weight
+
+
+def balanced(alpha: float, weights: Weights = Weights()) -> Weights:
+    """`weights` with words times alpha / 0.2 and continuity (what a cut and its change of pose and rate cost) times
+    (1 - alpha) / 0.8, so that alpha = 0.2, the paper's and the default, leaves them as they are.
+
+    Speed, turn and facing keep their weights: they hold the body on its track, which is nothing to be traded. So do
+    actions that nobody asked for, and replayed stretches.
+    """
+    words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
+    return replace(
+        weights, words=weights.words * words, **{name: getattr(weights, name) * continuity for name in _CONTINUITY}
+    )

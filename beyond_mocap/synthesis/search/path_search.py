@@ -22,9 +22,8 @@ from .edit_list import EditList, PlacedKey, find_seams, replaced
 from .key_fit import ball_at, misfit, strikes
 from .offer import RATES, SLOT
 from .path_costs import Alike, PathCosts, Weights
+from .preferences import Used, weak_foot_cost
 from .slots import key_pieces, slot_edges, slot_of
-from .style import weak_foot_cost
-from .used import Used
 from .wanted import Wanted
 
 MEMORY_SLOTS = 15

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...annotation.gaze import wanted_offset
-from ...base.runs import runs
+from ...base.time_series import runs
 from ...library.library import Library
 from ...motion import quaternion
 from .edit_list import EditList, PlacedKey

@@ -25,10 +25,8 @@ from ...library.automatic import automatic_words
 from ...library.keys import Key, nearest_serving, nearest_words, serving, standing_in
 from ...library.library import Library
 from ...motion.track import SampledTrack
-from ..plan import Plan
-from ..resolved_plan import ResolvedPlan
-from .style import off_style_cost
-from .variety import Taste, taste
+from ..plan import Plan, ResolvedPlan
+from .preferences import Taste, off_style_cost, taste
 
 PAPERS_OMEGA = 4.0
 

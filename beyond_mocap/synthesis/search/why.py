@@ -15,17 +15,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...library.library import Library
-from ..resolved_plan import ResolvedPlan
+from ..plan import ResolvedPlan
 from ..search_library import search_library
-from .annotation_cost import AnnotationCost
-from .balance import balanced
+from .block_costs import AnnotationCost, distances, typical_distance, windows
 from .cheapest_way import Offered
 from .edit_list import EditList
 from .offer import RATES, SLOT
-from .path_costs import Term, Weights
+from .path_costs import Term, Weights, balanced
 from .path_search import MEMORY_SLOTS, PathSearch, States
 from .slots import Pieces, slot_edges
-from .transition_cost import distances, typical_distance, windows
 from .wanted import Wanted, build_order
 
 NEAREST = 3

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.arctangent import arctan2
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify_posed
 from ...motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics

@@ -17,9 +17,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.errors import InputError
-from ...base.vectors import unit_vector
+from ...base.vectors import arctan2, unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import identify
 from ...motion.skeleton import Skeleton, frozen_array

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.arctangent import arctan2
 from ...base.errors import InputError
+from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.between_frames import cubic_at
 from ...motion.motion import pose_kinematics

@@ -6,12 +6,12 @@ import sys
 
 import numpy as np
 
-from beyond_mocap.base.arctangent import arctan2
+from beyond_mocap.base.vectors import arctan2
 
 TOP = pathlib.Path(__file__).resolve().parents[3]
 PLACES = """
 import numpy as np
-from beyond_mocap.base.arctangent import arctan2
+from beyond_mocap.base.vectors import arctan2
 vectors = np.random.default_rng(4).normal(size=(1801, 3))
 sine = vectors[:, 0].copy()
 expected, others, kept = np.arctan2(sine, vectors[:, 1].copy()), 0, []

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from beyond_mocap.base.runs import equal_runs, run_numbers, runs
+from beyond_mocap.base.time_series import equal_runs, run_numbers, runs
 
 
 def test_runs_at_both_ends_and_between():

@@ -7,8 +7,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings import rows_of
 from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.search.balance import balanced
-from beyond_mocap.synthesis.search.path_costs import Weights
+from beyond_mocap.synthesis.search.path_costs import Weights, balanced
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

@@ -9,7 +9,7 @@ from beyond_mocap.match.crowd.variety import APART, in_step, lags, share_in_step
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.variety import LIKED, PERIOD, taste
+from beyond_mocap.synthesis.search.preferences import LIKED, PERIOD, taste
 from beyond_mocap.synthesis.search.wanted import build_order
 from beyond_mocap.synthesis.synthesize import synthesize
 

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resynthesize import HAND_OVER, Anew, resynthesize, shown_footage
-from beyond_mocap.synthesis.search.used import AGAIN, SAME_CLIP, Used, price
+from beyond_mocap.synthesis.search.preferences import AGAIN, SAME_CLIP, Used, price
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

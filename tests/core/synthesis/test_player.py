@@ -12,7 +12,7 @@ from beyond_mocap.motion.humanoid import identify, stature
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthesis.plan import METHODS, Pin, Plan
 from beyond_mocap.synthesis.resynthesize import resynthesize
-from beyond_mocap.synthesis.search.style import named_by
+from beyond_mocap.synthesis.search.preferences import named_by
 from beyond_mocap.synthesis.synthesize import synthesize
 
 

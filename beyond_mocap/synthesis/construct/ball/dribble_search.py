@@ -8,7 +8,7 @@ import numpy as np
 
 from ....annotation.striking import nearest_on
 from ....ball.roll import rolls, speeds_of
-from ....base.runs import runs
+from ....base.time_series import runs
 from ....motion.track import BALL_RADIUS
 from .legs import SLOW, Legs
 from .meeting import touching_places

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from beyond_mocap.synthesis.search.annotation_cost import AnnotationCost
+from beyond_mocap.synthesis.search.block_costs import AnnotationCost
 
 WORDS = ("jogging", "kick", "right", "walking")
 

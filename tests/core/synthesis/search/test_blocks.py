@@ -7,7 +7,7 @@ from beyond_mocap.base.errors import Cancelled
 from beyond_mocap.library.build import build
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.annotation_cost import AnnotationCost
+from beyond_mocap.synthesis.search.block_costs import AnnotationCost
 from beyond_mocap.synthesis.search.blocks import FINEST, BlockSearch
 from beyond_mocap.synthesis.search.distance import frames_of, straight_edit
 from beyond_mocap.synthesis.search.wanted import build_order, pool_frame

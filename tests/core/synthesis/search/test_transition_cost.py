@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.synthesis.search.transition_cost import distances, typical_distance, windows
+from beyond_mocap.synthesis.search.block_costs import distances, typical_distance, windows
 
 
 def test_distances_are_euclidean():

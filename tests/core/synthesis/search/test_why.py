@@ -11,10 +11,9 @@ from beyond_mocap.library.build import build
 from beyond_mocap.motion.track import BALL_RADIUS, Track, clean
 from beyond_mocap.synthesis.plan import Pin, Plan, SolvedCourse, Touched
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
-from beyond_mocap.synthesis.search.balance import balanced
 from beyond_mocap.synthesis.search.blocks import BlockSearch
 from beyond_mocap.synthesis.search.distance import exact_keys, straight_edit
-from beyond_mocap.synthesis.search.path_costs import TERMS, Weights
+from beyond_mocap.synthesis.search.path_costs import TERMS, Weights, balanced
 from beyond_mocap.synthesis.search.path_search import PathSearch
 from beyond_mocap.synthesis.search.why import block_reasons, explain_choices, reasons
 from beyond_mocap.synthesis.synthesize import synthesize

@@ -1,0 +1,153 @@
+"""What the search prefers besides the order: clips of a style, the strong foot, players out of step, other footage.
+
+Players out of step: players whose tracks are alike are given the same clips, and where they begin them at the same time
+they move as one. A clip that is played goes along with the clock: a player that shows its second s at time t of the
+match is s - t ahead of it, and this is the lag. Every player likes lags that are PERIOD apart, and players who come
+near each other are given other ones (`match.crowd.variety.lags`).
+
+Other footage: a search for another solution pays for frames that an earlier one has shown, and a little for other
+frames of the same clips. It is a price, not a ban: where nothing else comes near what is asked, they are shown again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import PurePosixPath
+
+import numpy as np
+
+from ...annotation.ball_contact import may_use_foot
+from ...annotation.vocabulary import SIDES
+from ...library.keys import Key
+from ...library.library import Library
+
+WEAK_FOOT_COST = 1.5
+"""What serving a key moment by the weak foot costs, in metres per second of missed speed."""
+
+_SIDES = frozenset(SIDES)
+
+PERIOD = 3.6
+"""Seconds from one liked lag to the next."""
+
+SPREAD = 0.6180339887
+"""Of a period by which a clip's places in it are ahead of those of the clip before: a clip that is shorter than a
+period has room for some lags only, and others have room for the rest. Multiples of the golden section lie evenly."""
+
+LIKED, DISLIKED = 0.05, 0.45
+"""Seconds from a liked lag within which all is well, and from which on it is as bad as it gets."""
+
+AGAIN = 1.0
+"""Price per slot of the very footage, that of a metre per second of missed speed."""
+SAME_CLIP = 0.25
+"""Price per slot of other frames of the same clip, or of its mirror image."""
+AROUND = 0.25
+"""Seconds around shown footage that count as shown."""
+
+
+def off_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
+    """(N,) float32: `weight` for library frames that neither carry a word of `style` nor belong to a clip that one of
+    its patterns names; None where there is no style. A pattern that names nothing is told in `warnings`."""
+    if not style or not weight:
+        return None
+    frames = library.frames
+    matches = np.zeros(len(frames), bool)
+    for entry in style:
+        word, clips = entry.lower(), np.array([named_by(clip.path, entry) for clip in library.clips])
+        carries = frames.words[:, [i for i, known in enumerate(frames.vocabulary) if known == word]].any(axis=1)
+        if not carries.any() and not clips.any():
+            warnings.append(f"style '{entry}': the library has no such word, folder or clip")
+        matches |= carries | clips[frames.clip]
+    return np.where(matches, 0.0, weight).astype(np.float32)
+
+
+def named_by(path: str, pattern: str) -> bool:
+    """Whether a clip's path below the library is meant by a pattern: the path itself with * and ?, one of its folders,
+    or its file's name with or without ending; letter case does not count."""
+    path, pattern = path.lower(), pattern.lower().replace("\\", "/").rstrip("/")
+    whole = PurePosixPath(path)
+    names = (path, whole.name, whole.stem, *map(str, whole.parents), *whole.parts[:-1])
+    return any(fnmatchcase(name, pattern) for name in names if name != ".")
+
+
+def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str) -> np.ndarray:
+    """(K,) what it costs to serve a key moment of the `asked` words by each of the choices: nothing where a side is
+    asked for, where no foot meets the ball, or where nobody minds."""
+    if not weak_foot or _SIDES.intersection(asked):
+        return np.zeros(len(choices))
+    weak = [weak_foot in key.words and may_use_foot(key.words) for key in choices]
+    return WEAK_FOOT_COST * np.array(weak, float)
+
+
+@dataclass(frozen=True, eq=False)
+class Taste:
+    """place (N,) int: where each library frame lies in the period; table (2 P,) float32: what a lag costs per slot, two
+    periods of P frames; start: frames of the track's first frame on the match's clock."""
+
+    place: np.ndarray
+    table: np.ndarray
+    start: int
+
+    def cost(self, first: int, frame: np.ndarray) -> np.ndarray:
+        """(K,) what it costs to show library frames (K,) from the track's frame `first` on."""
+        return self.table[self.place[frame] + (-first - self.start) % (len(self.table) // 2)]
+
+
+def taste(library: Library, lag: float, variety: float, start: float) -> Taste | None:
+    """The taste of a player who likes this lag, s: 0 to `variety` (m/s of missed speed) per slot; None where that is 0.
+    start: seconds of the track's first frame on the match's clock."""
+    if not variety:
+        return None
+    frames = library.frames
+    period = round(PERIOD * library.fps)
+    offset = np.arange(len(frames.first)) * SPREAD % 1.0 * period
+    place = (np.arange(len(frames)) - frames.first[frames.clip] + offset.astype(int)[frames.clip]) % period
+    off = np.arange(period) / period - lag / PERIOD
+    away = np.abs(off - np.round(off)) * PERIOD
+    table = variety * np.clip((away - LIKED) / (DISLIKED - LIKED), 0.0, 1.0)
+    return Taste(place, np.tile(table, 2).astype(np.float32), round(start * library.fps))
+
+
+@dataclass(frozen=True)
+class Used:
+    """A piece of a clip that has been shown. clip: path below the library; first, last: frames of the clip at the
+    library's rate."""
+
+    clip: str
+    mirrored: bool
+    first: float
+    last: float
+
+
+def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
+    """The footage that frames first .. end of an `EditList` show."""
+    found = []
+    for low, high in edit.pieces:
+        low, high = max(low, first), min(high, end)
+        if low < high:
+            clip = int(edit.clip[low])
+            frames = edit.frame[low:high] - library.frames.first[clip]
+            source = library.clips[clip]
+            found.append(Used(source.path, source.mirrored, float(frames.min()), float(frames.max())))
+    return tuple(dict.fromkeys(found))
+
+
+def price(library: Library, used: tuple[Used, ...]) -> np.ndarray:
+    """(N,) float32: what every library frame costs more per slot; clips that the library does not have are left out."""
+    cost = np.zeros(len(library.frames), np.float32)
+    frames, around = library.frames, AROUND * library.fps
+    place = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}
+    clips = {piece.clip for piece in used}
+    for number, clip in enumerate(library.clips):
+        if clip.path in clips:
+            cost[frames.first[number] : frames.first[number] + frames.count[number]] = SAME_CLIP
+    for piece in used:
+        number = place.get((piece.clip, piece.mirrored))
+        if number is None:
+            continue
+        start, last = frames.first[number], frames.first[number] + frames.count[number] - 1
+        low = max(start, int(np.floor(start + piece.first - around)))
+        high = min(last, int(np.ceil(start + piece.last + around)))
+        cost[low : high + 1] = AGAIN
+    return cost
