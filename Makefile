@@ -69,7 +69,7 @@ quick: venv
 	done; exit $$status
 
 test-core: venv
-	.venv/bin/python $(PYTEST) -n 2 --dist loadfile tests/core tests/packaging
+	.venv/bin/python $(PYTEST) -n 2 --dist loadgroup tests/core tests/packaging
 
 test-training: training
 	.venv-training/bin/python $(PYTEST) tests/training

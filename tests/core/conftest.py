@@ -1,5 +1,6 @@
 """A small made library with planted truths (speeds, a kick's moment), and made tracks, for the core's tests."""
 
+import os
 from pathlib import Path
 from typing import NamedTuple
 
@@ -28,6 +29,24 @@ from beyond_mocap.synthetic.resting import on_the_side
 
 SPEEDS = {"stand": (0.0, "standing"), "walk": (1.4, "walking"), "jog": (2.8, "jogging"), "run": (5.0, "running")}
 KICK = "kick low inside right"
+HERE = Path(__file__).resolve().parent
+SAMPLE_LIBRARY = HERE.parents[1] / "sample_blend" / "library"
+
+
+def pytest_collection_modifyitems(items):
+    """The tests of one room run in one process, so that its session fixtures are made once."""
+    for item in items:
+        room = item.path.relative_to(HERE).parts[0] if item.path.is_relative_to(HERE) else item.path.name
+        item.add_marker(pytest.mark.xdist_group(room))
+
+
+@pytest.fixture(scope="session")
+def sample_cache(tmp_path_factory) -> Path:
+    """The cache of the sample library, with its synthetic clips in it; processes side by side share it."""
+    base = tmp_path_factory.getbasetemp()
+    place = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "sample_cache"
+    assert build(SAMPLE_LIBRARY, cache_dir=place).extended.clips
+    return place
 
 
 def write_clip(path: Path, motion: Motion, text: str) -> Path:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import parse_timeline
-from beyond_mocap.library.build import build
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.pieces import pool
@@ -112,14 +111,6 @@ def cluster(chores, tmp_path):
     for process in processes:
         process.kill()
         process.wait()
-
-
-@pytest.fixture(scope="session")
-def sample_cache(tmp_path_factory):
-    """The cache of the sample library, with its made clips in it."""
-    place = tmp_path_factory.mktemp("cache")
-    assert build(LIBRARY, cache_dir=place).extended.clips
-    return place
 
 
 @pytest.fixture(scope="session")

@@ -17,12 +17,12 @@ SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory):
+def made(sample_cache, tmp_path_factory):
     """Four seconds of one player of the sample's match, and the library."""
     place = tmp_path_factory.mktemp("thumbnails")
     order = MatchOrder(
         tracking=SAMPLE / "match" / "small" / "small.dat", library=SAMPLE / "library", out=place / "made",
-        cache=place / "cache", start=2.0, end=6.0, players=("home_1",), solve_touches=False, figures=False, workers=1,
+        cache=sample_cache, start=2.0, end=6.0, players=("home_1",), solve_touches=False, figures=False, workers=1,
     )  # fmt: skip
     assert make_match(order).failed == ()
     return place / "made", build(order.library, cache_dir=order.cache)

@@ -26,8 +26,8 @@ TIMES = np.arange(0.0, 12.05, 0.1)
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    return build(LIBRARY, cache_dir=tmp_path_factory.mktemp("cache"))
+def library(sample_cache):
+    return build(LIBRARY, cache_dir=sample_cache)
 
 
 @pytest.fixture(scope="module")
