@@ -13,6 +13,7 @@ from ..annotation import Timeline
 from ..base.errors import InputError, told_time
 from ..base.settings import defaults, rows_of, setting
 from ..base.settings.setting import LATER, add_fields, check_limits
+from ..base.time_series import interpolate
 from ..motion.skeleton import frozen_array
 from ..motion.track import SampledTrack, Track, sample
 
@@ -81,7 +82,7 @@ class SolvedCourse:
     def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The ball (T, 3) m at `times` (T,) s, NaN where it is not known,
         and whether the feed has filled it in (T,)."""
-        ball = np.stack([np.interp(times, self.times, column, np.nan, np.nan) for column in self.ball.T], axis=1)
+        ball = interpolate(times, self.times, self.ball, outside=np.nan)
         near = np.clip(np.searchsorted(self.times, times), 0, len(self.times) - 1)
         return ball, self.filled[near]
 
