@@ -11,8 +11,7 @@ import numpy as np
 from benchmarks import effort, markdown
 from benchmarks.edit_time import edit_times
 from benchmarks.places import LIBRARIES, library_folder, scenario
-from beyond_mocap.evaluation.judged import judged
-from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.evaluation.report import evaluate, judged
 from beyond_mocap.library.build import build
 from beyond_mocap.library.library import Library
 from beyond_mocap.synthesis.plan import Plan

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -16,9 +16,8 @@ from ..motion.track import sample, zero_phase_hann
 from ..synthesis.quality import feet, jerk, pieces, root
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
-from . import realism, words
-from .reference import source_poses
-from .view import View
+from . import realism
+from .reference import View, source_poses
 
 
 def place(view: View) -> dict:
@@ -234,14 +233,14 @@ def annotation_similarity(view: View) -> dict:
     had = [m for m in view.moments if serving(offered, m.asked.words)]
 
     def mean(want, have, measure):
-        return words.mean_similarity(words.similarity(want, have, measure))
+        return mean_similarity(similarity(want, have, measure))
 
     return {
-        "all": mean(asked, played.words, words.asked_similarity),
-        "keys": mean(want, have, words.asked_similarity),
-        "had_keys": mean([m.asked.words for m in had], [m.words for m in had], words.asked_similarity),
-        "eq18_all": mean(asked, played.words, words.eq18),
-        "eq18_keys": mean(want, have, words.eq18),
+        "all": mean(asked, played.words, asked_similarity),
+        "keys": mean(want, have, asked_similarity),
+        "had_keys": mean([m.asked.words for m in had], [m.words for m in had], asked_similarity),
+        "eq18_all": mean(asked, played.words, eq18),
+        "eq18_keys": mean(want, have, eq18),
     }
 
 
@@ -283,3 +282,42 @@ def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
     known = values[np.isfinite(values)]
     measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}
     return {name: float(measures[name](known)) if len(known) else math.nan for name in names}
+
+
+def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
+    """Faustino eq. 18 for one frame as printed: -1 all words alike .. 1 none, NaN where neither has a word.
+
+    With 1 for a present and -1 for an absent word, the products over words that either frame has, negated, over their
+    number r: one word in common counts -1, one that only one of them has counts +1.
+    """
+    asked, played = set(asked), set(played)
+    either = asked | played
+    return (len(asked ^ played) - len(asked & played)) / len(either) if either else np.nan
+
+
+def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
+    """Eq. 18 over the asked words only: -1 all are played .. 1 none is; words beyond those count neither way."""
+    asked = set(asked)
+    return 1.0 - 2.0 * len(asked & set(played)) / len(asked) if asked else np.nan
+
+
+def similarity(
+    asked: Sequence[Iterable[str] | None], played: Sequence[Iterable[str]], measure=asked_similarity
+) -> np.ndarray:
+    """`measure` at every frame: (T,), NaN where nothing was asked. Takes repeat words, so each pair is scored once."""
+    known: dict[tuple, float] = {}
+    out = np.full(len(played), np.nan)
+    for frame, (want, have) in enumerate(zip(asked, played)):
+        if want is None:
+            continue
+        pair = (tuple(want), tuple(have))
+        if pair not in known:
+            known[pair] = measure(*pair)
+        out[frame] = known[pair]
+    return out
+
+
+def mean_similarity(values: np.ndarray) -> float:
+    """Mean of the frames that count, NaN where none does (Faustino Table 2 averages so)."""
+    counted = values[np.isfinite(values)]
+    return float(counted.mean()) if len(counted) else np.nan

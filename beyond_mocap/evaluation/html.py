@@ -31,8 +31,8 @@ from .html_page import (
     element,
     fragment,
 )
-from .judged import judged
-from .view import View
+from .reference import View
+from .report import judged
 
 MOST_MOMENTS = 12
 """Strips of key moments on the page; the table tells all of them."""

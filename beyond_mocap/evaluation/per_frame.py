@@ -15,7 +15,7 @@ from ..annotation.ball_contact import surfaces
 from ..annotation.striking import faster_middle, nearest_on
 from ..synthesis.quality import feet, jerk, root
 from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
-from .view import View
+from .reference import View
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -18,7 +18,7 @@ from ..motion.quaternion import about_up, rotate
 from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import pieces, root
 from . import figures, realism
-from .view import View
+from .reference import View
 
 WIDTH = 11.0
 DPI = 100

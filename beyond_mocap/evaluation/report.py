@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +14,10 @@ from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality.moments import dribble_touches
 from ..synthesis.quality.played import Played, played_from_take
+from ..synthesis.quality.targets import target_of
 from ..synthesis.take import Take
 from . import figures
-from .view import View
+from .reference import View
 
 VERSION = 1
 DEEPEST = 30
@@ -156,3 +157,38 @@ def cell(value) -> str:
     if isinstance(value, list):
         return " ".join(str(entry) for entry in value) or "-"
     return f"{value:.4g}" if isinstance(value, float) else str(value).replace("|", "\\|")
+
+
+class Row(NamedTuple):
+    """One figure as text: `own` is the recordings' score, status "met", "missed" or ""."""
+
+    name: str
+    value: str
+    own: str
+    target: str
+    status: str
+
+
+def judged(report: Mapping) -> Iterator[Row]:
+    """Every figure of a report (`evaluate`) that is known or has a target."""
+    table = flat(report)
+    fps = float(report.get("fps") or 30.0)
+    for name, value in table.items():
+        group, _, leaf = name.rpartition(".")
+        target = target_of(name, fps)
+        if leaf.startswith("source_") or leaf == "own" or (value is None and target is None):
+            continue
+        own = table.get(f"{group}.source_{leaf}", table.get(f"{group}.own") if leaf == "mean" else None)
+        known = isinstance(value, (int, float))
+        met = target.met(value, table) if target and known else None
+        status = "" if met is None else ("met" if met else "missed")
+        aim = target.text(table) if target else ""
+        yield Row(name, _shown(value), "" if own is None else _shown(own), aim, status)
+
+
+def _shown(value) -> str:
+    if value is None:
+        return "–"
+    if isinstance(value, list):
+        return " ".join(map(str, value)) or "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

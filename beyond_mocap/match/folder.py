@@ -23,7 +23,7 @@ from ..base.errors import InputError
 from ..files.content import content
 from ..files.tables import plain
 from ..files.whole import atomic_write
-from .pieces.content_digest import digest_of
+from .order import digest_of
 
 STATE = "match.json"
 WORDS = "annotations"

@@ -33,8 +33,8 @@ from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pieces import stages
 from .pieces.pool import Workplace, check_place, ended
-from .pieces.workplace_library import LibrarySource, hold
-from .report.thumbnails import thumbnails
+from .pieces.work import LibrarySource, hold
+from .report.strips import thumbnails
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import begun, now, row_of
 

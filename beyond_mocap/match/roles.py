@@ -15,7 +15,7 @@ from ..motion.track.match_data import Match, MatchPlayer
 from .crowd.spacing import keeping, spaced
 from .crowd.variety import lags
 from .order import MatchOrder
-from .pieces.cut_plan import cut_track
+from .pieces.units import cut_track
 
 SHORTEST = 1.0
 """Seconds; who is there for less is not made."""

@@ -14,8 +14,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..evaluation.paired_tests import judged
 from .answers import Answers
+from .form import SAME, SCALE
 from .order import Study
-from .questions import SAME, SCALE
 
 ALPHA = 0.05
 

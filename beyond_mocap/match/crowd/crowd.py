@@ -20,9 +20,8 @@ from ...motion.motion import Motion
 from .capsules import FAR, capsules, lines, touching
 from .correction import CURVES, Correction, carried
 from .crowd_body import CrowdBody, moved
-from .episodes import Episode, Span, meetings
-from .pressure import Pressure
-from .pushing import ALLOWED, pushed
+from .pushing import ALLOWED, Pressure, pushed
+from .spacing import Episode, Span, meetings
 
 REACH = 1.5
 """Seconds before and behind an overlap within which something is changed."""

@@ -3,24 +3,27 @@ it."""
 
 from __future__ import annotations
 
+import io
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
+from ...files.whole import atomic_write
 from ...library.features import FPS
 from ...library.library import Library
 from ...motion.motion import Motion
 from ...synthesis.take import Take
 from ..expand import expanded
-from ..match_ball import course, led_by, met
-from ..pieces.cut_plan import cut_plan
+from ..match_ball import at_ball, course, led_by, met
 from ..pieces.named_edit import part
+from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
 from .correction import CURVES, Correction, applied
 from .crowd import kept_apart, overlap_depths
-from .restore_ball_contact import at_ball
 from .spacing import keeping
 
 LONGEST = 60.0
@@ -33,6 +36,8 @@ REACH = 2.0
 """Seconds around an edge between two windows in which the corrections of one go over into the other's."""
 
 _SETTLED = 8.0  # s of an edit list, beyond those, by which its motion does not depend on where it begins
+
+_ARRAYS = ("frames", "depth", "led_frames", "led")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -131,3 +136,30 @@ def in_turn(corrections: Sequence[Correction], fps: float) -> Correction:
     knots = np.concatenate([one.knots for one in corrections])
     values = np.concatenate([one.values for one in corrections]).reshape(-1, CURVES)
     return Correction(knots, values, corrections[0].fps, corrections[0].step)
+
+
+def keep_parts(path: Path, parts: Sequence[CrowdPart]) -> None:
+    """Writes a window's parts, in the order of the players; InputError where that cannot be done."""
+    arrays = {}
+    for number, one in enumerate(parts):
+        arrays |= {f"{number}.{name}": getattr(one, name) for name in _ARRAYS}
+        arrays |= {f"{number}.knots": one.correction.knots, f"{number}.values": one.correction.values}
+    header = [[one.correction.fps, one.correction.step, one.before] for one in parts]
+    out = io.BytesIO()
+    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def kept_parts(path: Path) -> tuple[CrowdPart, ...] | None:
+    """The parts that `keep_parts` wrote; None where there are none, or none that can be read whole."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            header = json.loads(kept["header"].tobytes())
+            return tuple(
+                CrowdPart(
+                    correction=Correction(kept[f"{number}.knots"], kept[f"{number}.values"], fps, step),
+                    before=before, **{name: kept[f"{number}.{name}"] for name in _ARRAYS},
+                ) for number, (fps, step, before) in enumerate(header)
+            )  # fmt: skip
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+        return None

@@ -14,11 +14,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...base.vectors import unit_vectors
 from .capsules import Touching, touching
-from .crowd_body import Contact, CrowdBody, moved
-from .giving import BASE, Calm, given
-from .pressure import Pressure, pressed
-from .sides import sides, way_out
+from .crowd_body import BASE, Calm, Contact, CrowdBody, given, moved
 
 ALLOWED = 0.005
 """Metres of overlap that are left as they are."""
@@ -33,6 +31,50 @@ _ROUNDS, _ARMS_ALONE = 24, 4
 _STEP = 0.35
 _LOOKED_OVER = 8  # rounds after which it is looked anew who is near
 _CLOSE, _AROUND = 0.1, 4  # metres within which, and frames around which bodies are near
+
+SECONDS = 0.2
+"""Seconds before and behind a moment within which a contact counts for the side at that moment, less the farther."""
+
+
+OUTWARD = 2.0
+"""How much the way between two trunks counts against the side on which two capsules pass."""
+
+
+STEP = 0.2
+"""Share of what lacks that a contact presses with from then on."""
+
+MOST = 0.5
+"""Metres that a contact presses with at most: bodies that cannot get apart are not thrown about."""
+
+
+class Pressure:
+    """The pressures (K,) m of contacts that are known by whole numbers, and the sides (K, 3) to which the one is pushed
+    out of the other; 0 for all others."""
+
+    def __init__(self):
+        self.keys, self.values, self.sides = np.zeros(0, int), np.zeros(0), np.zeros((0, 3))
+
+    def pushes(self, keys: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What contacts `keys` (K,) have pressed with so far: (K,) m and to which side (K, 3) unit."""
+        if not len(self.keys):
+            return np.zeros(len(keys)), np.zeros((len(keys), 3))
+        at = np.minimum(np.searchsorted(self.keys, keys), len(self.keys) - 1)
+        return np.where(self.keys[at] == keys, self.values[at], 0.0), self.sides[at]
+
+    def keep(self, keys: np.ndarray, values: np.ndarray, sides: np.ndarray, span: tuple[int, int]) -> None:
+        """Contacts `keys` (K,), no number twice, press with `values` (K,) m to the sides (K, 3) from now on; all others
+        with numbers from span[0] to below span[1] press no more."""
+        order = np.argsort(keys, kind="stable")
+        kept = order[values[order] > 0.0]
+        low, high = np.searchsorted(self.keys, span)
+        for name, new in (("keys", keys), ("values", values), ("sides", sides)):
+            old = getattr(self, name)
+            setattr(self, name, np.concatenate([old[:low], new[kept], old[high:]]))
+
+
+def pressed(before: np.ndarray, lack: np.ndarray) -> np.ndarray:
+    """(K,) m that contacts press with which pressed with `before` (K,) m and lack `lack` (K,) m of distance."""
+    return np.clip(before + STEP * lack, 0.0, MOST)
 
 
 def pushed(
@@ -121,3 +163,39 @@ def _share(found: Touching, way, give, bodies, placed, pair: tuple[int, int], is
 def _middle(lines: np.ndarray) -> np.ndarray:
     """(T, 3) m: the middle of the hips."""
     return lines[:, 0].mean(axis=1)
+
+
+def sides(found: Touching, before: np.ndarray, fps: float) -> np.ndarray:
+    """(K, 3) unit vectors from the other to the one: the way from line to line plus `before` (K, 3) m, weighed over
+    SECONDS around each contact among contacts of the same two capsules."""
+    reach = max(1, round(SECONDS * fps))
+    order = np.lexsort((found.frame, found.other, found.one))
+    frame, one, other = found.frame[order], found.one[order], found.other[order]
+    off = (_off(found) + before)[order]
+    total = np.array(off)
+    for step in range(1, min(reach, len(off))):
+        apart = frame[step:] - frame[:-step]
+        same = (one[step:] == one[:-step]) & (other[step:] == other[:-step])
+        weight = np.where(same, np.maximum(1.0 - apart / reach, 0.0), 0.0)[:, None]
+        total[step:] += weight * off[:-step]
+        total[:-step] += weight * off[step:]
+    out = np.empty_like(total)
+    out[order] = unit_vectors(total)
+    return out
+
+
+def way_out(found: Touching, side: np.ndarray, trunks: np.ndarray, allowed: float) -> tuple[np.ndarray, np.ndarray]:
+    """Which way (K, 3), unit, the one leaves the other by, and how far (K,) m until they are `allowed` m in each other,
+    negative where there is room. side (K, 3): on which they pass, turned towards the way over the ground from the
+    other's trunk to the one's, trunks (T, 3) m, so that limbs that have caught each other come free."""
+    out = trunks[found.frame] * np.array([1.0, 1.0, 0.0])
+    way = unit_vectors(side + OUTWARD * unit_vectors(out))
+    off = _off(found)
+    along = np.einsum("kc,kc->k", way, off)
+    square = along**2 + (found.radii - allowed) ** 2 - np.einsum("kc,kc->k", off, off)
+    return way, np.sqrt(np.maximum(square, 0.0)) - along
+
+
+def _off(found: Touching) -> np.ndarray:
+    """(K, 3) m from the other's line to the one's."""
+    return found.away * (found.radii - found.depth)[:, None]

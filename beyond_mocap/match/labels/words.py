@@ -6,18 +6,23 @@
 
 from __future__ import annotations
 
+import os
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from ...annotation import KeyMoment, Span, Timeline
+from ...annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, validate
 from ...annotation.ball_contact import takes_with_foot
 from ...annotation.event_words import EventWords, read_event_words
 from ...ball.tracked import kinds
 from ...ball.tracked.solve import SolvedBall, SolvedTouch
+from ...base.digest import hex_digest
 from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ...files.whole import atomic_write
 from ...motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned
 
@@ -41,6 +46,8 @@ _TOLD = 0.4  # confidence in an event without a touch
 _SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
 _LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
+
+_HEAD = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -241,3 +248,47 @@ def _notes(touches, left_out: Counter) -> list[str]:
         (left_out["close"], f"touches within {NEAREST:g} s of a surer one of the same player make no key moment"),
     ]
     return [f"{count} {what}" for count, what in told if count]
+
+
+def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
+    """Writes one player's moments; InputError where that cannot be done."""
+    lines = [f"{_line(moment)}  # {moment.source} {moment.confidence:.2f}\n" for moment in ordered(moments)]
+    told = "edit freely. A file that was edited is kept and used, another made anew"
+    atomic_write(path, f"# words of {' '.join(player.split())}: {told} [{_digest(lines)}]\n{''.join(lines)}")
+
+
+def edited(path: str | os.PathLike) -> bool:
+    """Whether there is such a file and somebody has changed it since it was written, or wrote it himself."""
+    if not Path(path).is_file():
+        return False
+    lines = read_text(path).splitlines(keepends=True)
+    head = _HEAD.fullmatch(lines[0]) if lines else None
+    return head is None or head[1] != _digest(lines[1:])
+
+
+def read_words(
+    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_words: Iterable[str] = ()
+) -> tuple[Moment, ...]:
+    """The moments in a file. automatic: lines that say what one of these says are that one; the others are the user's.
+
+    known_words: beyond the vocabulary. InputError, with the line, for what is no timeline or has unknown words.
+    """
+    timeline = parse_timeline(read_text(path), str(path))
+    validate(timeline, known_words, where=str(path))
+    known = {_line(moment): moment for moment in automatic}
+    found = [Moment(time=key.time, words=key.words, source=USER, confidence=1.0) for key in timeline.keys]
+    found += [Moment(
+        time=span.start, words=span.words, source=USER, confidence=1.0, end=span.end,
+    ) for span in timeline.spans]
+    return ordered(known.get(_line(moment), moment) for moment in found)
+
+
+def _line(moment: Moment) -> str:
+    """The contract's line for a moment."""
+    return format_timeline(timeline_of([moment])).rstrip("\n")
+
+
+def _digest(lines: Iterable[str]) -> str:
+    """Of what lines say, however they end."""
+    said = "\n".join(line.rstrip() for line in lines if line.strip())
+    return hex_digest(said, digits=8)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
+import io
+import json
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
+import numpy as np
+
+from ...base.errors import TimedLine, spans_of
+from ...files.whole import atomic_write
 from ...library.chosen import with_chosen_gaits
 from ...library.library import Library
 from ...synthesis.plan import Plan
@@ -14,9 +21,11 @@ from ...synthesis.search.balance import balanced
 from ...synthesis.search.distance import exact_keys
 from ...synthesis.search.path_search import PathSearch
 from ...synthesis.search.wanted import build_order
-from .library_clips import named
-from .named_edit import NamedEdit
+from .named_edit import NamedEdit, NamedKey, named
 from .units import Unit
+
+_ARRAYS = ("clip", "first", "rate", "length", "cut")
+_PLAIN = ("player", "stretch", "number", "first", "own", "seconds", "hurried")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -60,3 +69,29 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
 def searched_library(library: Library, plan: Plan) -> Library:
     """The library that all windows of a plan are searched in."""
     return with_chosen_gaits(library.extended if plan.made else library, dict(plan.gaits))
+
+
+def keep_piece(path: Path, piece: Piece) -> None:
+    """Writes a piece; InputError where that cannot be done."""
+    header = {name: getattr(piece, name) for name in _PLAIN}
+    header |= {"warnings": [[str(line), spans_of(line)] for line in piece.warnings]}
+    header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
+    out = io.BytesIO()
+    arrays = {name: getattr(piece.edit, name) for name in _ARRAYS}
+    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def kept_piece(path: Path) -> Piece | None:
+    """The piece that `keep_piece` wrote; None where there is none, or none that can be read whole."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            header = json.loads(kept["header"].tobytes())
+            arrays = {name: kept[name] for name in _ARRAYS}
+        keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
+        clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
+        told = tuple(TimedLine(text, *spans) for text, spans in header["warnings"])
+        header |= {"own": tuple(header["own"]), "warnings": told}
+        return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+        return None

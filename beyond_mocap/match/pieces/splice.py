@@ -18,10 +18,9 @@ from ...synthesis.search.path_costs import PathCosts
 from ...synthesis.search.slots import AROUND
 from ...synthesis.search.wanted import build_order
 from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
-from .cut_plan import cut_plan
-from .library_clips import bound
-from .named_edit import CONTINUES, NamedEdit, NamedKey, chained, part, retabled, table
+from .named_edit import CONTINUES, NamedEdit, NamedKey, bound, chained, part, retabled, table
 from .searched import Piece, searched_library
+from .units import cut_plan
 
 _APART = 4
 """Frames that a transition keeps from other seams, so that it can be faded over."""

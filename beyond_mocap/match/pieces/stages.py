@@ -17,22 +17,18 @@ from ...files.whole import atomic_write
 from ...library.library import Library
 from ...motion.track.ball_path import BallPath
 from ..crowd.correction import joined
-from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
-from ..crowd.kept_crowd import keep_parts, kept_parts
+from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn, keep_parts, kept_parts
 from ..folder import MatchFolder
-from ..order import FORM, MatchOrder
+from ..order import FORM, MatchOrder, digest_of
 from ..parts import Part
 from ..player_edit import PlayerEdit
 from ..state import MatchState
 from ..take_npz import write_player
-from .content_digest import digest_of
-from .kept_pieces import keep_piece, kept_piece
 from .pool import Failed, Workplace, run
-from .searched import Piece
+from .searched import Piece, keep_piece, kept_piece
 from .splice import spliced
 from .units import units_of
-from .work import Finish, finish_player, part_crowd, search_unit
-from .workplace_library import LibrarySource
+from .work import Finish, LibrarySource, finish_player, part_crowd, search_unit
 
 SEARCH, CROWD = "search", "crowd"
 """The kinds of pieces that are kept."""

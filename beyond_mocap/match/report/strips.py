@@ -4,8 +4,17 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
+
+from ...appearance.picture import pose_picture
+from ...base.errors import BeyondMocapError
+from ...library.library import Library
+from ..folder import read_state
+from ..shown import shown
+from ..take_npz import read_player
 
 CELLS = 900
 """Most cells of a strip; where a match has more seconds, each cell shows the worst of its own."""
@@ -13,6 +22,9 @@ FULL = 3.0
 """Times the limit at which the colour is at its end."""
 _GOOD, _LIMIT, _BAD = np.array([[226, 240, 229], [250, 205, 110], [170, 20, 20]], float)
 _NOBODY = np.array([236, 236, 236], float)
+
+SIZE = 224
+"""Pixels of a side."""
 
 
 def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
@@ -48,3 +60,19 @@ def png(pixels: np.ndarray) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
     )
+
+
+def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
+    """What draws a player at a second of the match: (SIZE, SIZE, 4) as `pose_picture` does, None where he has no motion
+    then or his edit list cannot be read. InputError where the folder has no match.json."""
+    files: Mapping[str, str] = {row["id"]: str(row.get("file", row["id"])) for row in read_state(folder)["players"]}
+
+    def drawn(player: str, second: float) -> np.ndarray | None:
+        path = folder / f"{files[player]}.take.npz"
+        try:
+            takes = shown(library, read_player(path), None, second, second + 1.0)
+            return pose_picture(takes[0].motion, 0, SIZE) if takes else None
+        except BeyondMocapError:
+            return None
+
+    return drawn

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.crowd.attention import looking
 from beyond_mocap.match.crowd.capsules import nearest, overlap, touching
 from beyond_mocap.match.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
-from beyond_mocap.match.crowd.episodes import episodes, joined_spans, meetings
-from beyond_mocap.match.crowd.spacing import DISTANCE, STEADY, keeping, spaced
+from beyond_mocap.match.crowd.spacing import DISTANCE, STEADY, episodes, joined_spans, keeping, meetings, spaced
+from beyond_mocap.match.shown import looking
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics, place

@@ -6,9 +6,7 @@ import pytest
 from beyond_mocap.match.crowd.capsules import Capsule, touching
 from beyond_mocap.match.crowd.correction import CURVES, ROOT
 from beyond_mocap.match.crowd.crowd_body import CrowdBody, moved
-from beyond_mocap.match.crowd.pressure import MOST, STEP, Pressure, pressed
-from beyond_mocap.match.crowd.pushing import pushed
-from beyond_mocap.match.crowd.sides import sides, way_out
+from beyond_mocap.match.crowd.pushing import MOST, STEP, Pressure, pressed, pushed, sides, way_out
 
 FPS, RADIUS = 30.0, 0.1
 

@@ -18,11 +18,13 @@ from beyond_mocap.match.labels.words import (  # fmt: skip
     Moment,
     apart,
     dribbles,
+    edited,
     moment_of,
+    read_words,
     timeline_of,
     words_of,
+    write_words,
 )
-from beyond_mocap.match.labels.words_text import edited, read_words, write_words
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
 from beyond_mocap.synthetic.ground_truth.planted import planted_match
 from beyond_mocap.synthetic.ground_truth.planted_feed import sampled

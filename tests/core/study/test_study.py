@@ -12,11 +12,9 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.study.analysis import analysed, cliffs_delta, holm, welch
 from beyond_mocap.study.answers import read_answers
-from beyond_mocap.study.bars import rows_of
 from beyond_mocap.study.form import form_page, form_table, questions_of
-from beyond_mocap.study.order import Clip, ordered
-from beyond_mocap.study.page import study_page
-from beyond_mocap.study.study_file import read_study, write_study
+from beyond_mocap.study.order import Clip, ordered, read_study, write_study
+from beyond_mocap.study.page import rows_of, study_page
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
 CLIPS = (
