@@ -1,4 +1,9 @@
-"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known."""
+"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known.
+
+How well the words were met is Faustino's annotation similarity (§3.2.2 eq. 18), as printed and over the asked words
+only. Words are sets per frame; sides are those after mirroring. A frame whose asked words are None (transition, or
+nothing known to be asked) is left out.
+"""
 
 from __future__ import annotations
 
@@ -46,14 +51,14 @@ def _surge(view: View) -> dict:
     ours = root.surge(view.played.pelvis, view.fps)
     own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
     rms, real = _rms(ours), _rms(own)
-    asked = None
-    if view.wanted is not None:
-        asked = _rms(root.surge(zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW), view.fps))
+    smooth = None if view.wanted is None else zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW)
+    asked = None if smooth is None else _rms(root.surge(smooth, view.fps))
     surge = {"mean": rms, "own": real, "track": asked}
     return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
 
 
 def keys(view: View) -> list[dict]:
+    """One group for each key moment."""
     return [_key(view, moment) for moment in view.moments]
 
 
@@ -63,27 +68,16 @@ def _key(view: View, moment: Moment) -> dict:
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
         error = root.root_error(played.pelvis, view.wanted, view.fps)
+        frame = int(round((met_at - played.start_time) * view.fps)) if np.isfinite(met_at) else moment.frame
         place["position_error_m"] = float(np.interp(time, played.times, error))
         place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
-        place["ball_shift_m"] = ball_shift(played, _met_frame(played, moment, met_at), view.track)
+        place["ball_shift_m"] = ball_shift(played, frame, view.track)
     return {
-        "time_s": moment.asked.time,
-        "solved_time_s": moment.asked.solved,
-        "labels": list(moment.asked.words),
-        "clip": moment.clip,
-        "clip_frame": moment.clip_frame,
-        "time_error_s": moment.played_at - time,
-        **place,
-        "contact_gap_m": ball_gap(played, moment),
-        "met_s": met_at,
-        "met_gap_m": met_gap,
+        "time_s": moment.asked.time, "solved_time_s": moment.asked.solved, "labels": list(moment.asked.words),
+        "clip": moment.clip, "clip_frame": moment.clip_frame, "time_error_s": moment.played_at - time, **place,
+        "contact_gap_m": ball_gap(played, moment), "met_s": met_at, "met_gap_m": met_gap,
         "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
-
-
-def _met_frame(played, moment: Moment, met_at: float) -> int:
-    """The output frame at which the ball is met; the key moment's where it is not."""
-    return int(round((met_at - played.start_time) * played.motion.fps)) if np.isfinite(met_at) else moment.frame
 
 
 def skate_and_ground(view: View) -> dict:
@@ -125,10 +119,8 @@ def polish(view: View, ik_miss: np.ndarray | None) -> dict:
     missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
     bones = None if view.library is None else _bone_change(view)
     return {
-        "foot_correction_m": _spread(shift, ("p95",)),
-        "ik_miss_share": None if missed is None else _mean(missed),
-        "pelvis_drop_m": drop,
-        "bone_change_m": bones,
+        "foot_correction_m": _spread(shift, ("p95",)), "ik_miss_share": None if missed is None else _mean(missed),
+        "pelvis_drop_m": drop, "bone_change_m": bones,
     }
 
 
@@ -164,18 +156,14 @@ def seams_and_loops(view: View) -> dict:
         at_seams = jerk.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         rest = jerk.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
-            **_spread(at_seams, ("median", "p95", "max")),
-            "share_above_real": _mean(at_seams > 1.0),
-            "source_share_above_real": _mean(view.own("jerk_above_real")),
-            "rest_max": _max(rest),
+            **_spread(at_seams, ("median", "p95", "max")), "share_above_real": _mean(at_seams > 1.0),
+            "source_share_above_real": _mean(view.own("jerk_above_real")), "rest_max": _max(rest),
             "rest_share_above_real": _mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
     rates = pieces.warp_rates(*view.source)
     return {
-        **out,
-        "seams": len(view.seams) if known else None,
-        "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
+        **out, "seams": len(view.seams) if known else None, "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
         "loop_share": _mean(pieces.replayed(*view.source, view.fps)) if known else None,
     }
 
@@ -199,7 +187,7 @@ def asked_words(
 ) -> list[frozenset[str] | None]:
     """Words asked for at each of `times` (T,) s; None where nothing counts: transitions, the entry and exit of each key
     moment's clip (Faustino §3.2.2), and automatic locomotion that was not filled in."""
-    out = [found if found else None for found in words_per_frame(timeline, times)]
+    out = [found or None for found in words_per_frame(timeline, times)]
     for moment in moments:
         out[moment.entry : moment.exit + 1] = [None] * (moment.exit + 1 - moment.entry)
     return out
@@ -231,57 +219,23 @@ def annotation_similarity(view: View) -> dict:
     want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
     offered = [] if view.library is None else view.library.keys
     had = [m for m in view.moments if serving(offered, m.asked.words)]
-
-    def mean(want, have, measure):
-        return mean_similarity(similarity(want, have, measure))
-
-    return {
-        "all": mean(asked, played.words, asked_similarity),
-        "keys": mean(want, have, asked_similarity),
-        "had_keys": mean([m.asked.words for m in had], [m.words for m in had], asked_similarity),
-        "eq18_all": mean(asked, played.words, eq18),
-        "eq18_keys": mean(want, have, eq18),
+    return {  # means of the frames that count (Faustino Table 2 averages so)
+        "all": _mean(similarity(asked, played.words)), "keys": _mean(similarity(want, have)),
+        "had_keys": _mean(similarity([m.asked.words for m in had], [m.words for m in had])),
+        "eq18_all": _mean(similarity(asked, played.words, eq18)), "eq18_keys": _mean(similarity(want, have, eq18)),
     }
 
 
 def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> list[str]:
     """What gave way, and when."""
-    lines = give_way(
-        view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss, asked=asked
-    )
+    lines: list[str] = [*give_way(view.played, track=view.track, timeline=view.timeline, library=view.library,
+                                  ik_miss=ik_miss, asked=asked)]
     if view.reference is None:
-        return [*lines]
+        return lines
     hard = jerk.jerk(view.played.positions, view.fps)
     ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
     told = jolts(view.played.times, view.seams, ratios)
-    return [*lines, told] if told else [*lines]
-
-
-def _mean(values: np.ndarray) -> float:
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
-    return float(known.mean()) if len(known) else math.nan
-
-
-def _median(values: np.ndarray) -> float:
-    return float(np.median(values)) if len(values) else math.nan
-
-
-def _max(values: np.ndarray) -> float:
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
-    return float(known.max()) if len(known) else math.nan
-
-
-def _rms(values: np.ndarray) -> float:
-    return math.sqrt(_mean(np.square(values)))
-
-
-def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
-    """Mean, median, p95 or max of values (N,), those that `names` asks for; NaN where there are none."""
-    known = values[np.isfinite(values)]
-    measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}
-    return {name: float(measures[name](known)) if len(known) else math.nan for name in names}
+    return [*lines, told] if told else lines
 
 
 def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
@@ -317,7 +271,31 @@ def similarity(
     return out
 
 
-def mean_similarity(values: np.ndarray) -> float:
-    """Mean of the frames that count, NaN where none does (Faustino Table 2 averages so)."""
-    counted = values[np.isfinite(values)]
-    return float(counted.mean()) if len(counted) else np.nan
+def _known(values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, dtype=float)
+    return values[np.isfinite(values)]
+
+
+def _mean(values: np.ndarray) -> float:
+    known = _known(values)
+    return float(known.mean()) if len(known) else math.nan
+
+
+def _median(values: np.ndarray) -> float:
+    return float(np.median(values)) if len(values) else math.nan
+
+
+def _max(values: np.ndarray) -> float:
+    known = _known(values)
+    return float(known.max()) if len(known) else math.nan
+
+
+def _rms(values: np.ndarray) -> float:
+    return math.sqrt(_mean(np.square(values)))
+
+
+def _spread(values: np.ndarray, names: Sequence[str]) -> dict[str, float]:
+    """Mean, median, p95 or max of values (N,), those that `names` asks for; NaN where there are none."""
+    known = values[np.isfinite(values)]
+    measures = {"mean": np.mean, "median": np.median, "p95": lambda v: np.percentile(v, 95), "max": np.max}
+    return {name: float(measures[name](known)) if len(known) else math.nan for name in names}

@@ -47,7 +47,7 @@ def curves(view: View) -> bytes:
         draw(ax, view)
         _mark_moments(ax, view)
     _time_axis(axes[-1], view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def legend(view: View) -> dict[int, tuple[int, str]]:
@@ -70,18 +70,16 @@ def clips(view: View) -> bytes:
     for low, high in zip(edges[:-1], edges[1:]):
         _clip_bar(bar, view, low, high, names)
     bar.set_yticks([])
-    bar.set_ylabel("clip")
-    bar.set_title("clips and seams; ' marks a mirrored clip", loc="left", fontsize=9.5)
+    _title(bar, "clips and seams; ' marks a mirrored clip", "clip")
     rate = np.append(pieces.played_rate(*view.source), np.nan)
     rate[view.seams - 1] = np.nan
     warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
     for limit in (0.85, 1.15):
         warp.axhline(limit, color="#999999", lw=0.8, ls="--")
-    warp.set_ylabel("played / recorded")
-    warp.set_title("time warp", loc="left", fontsize=9.5)
+    _title(warp, "time warp", "played / recorded")
     _mark_moments(warp, view)
     _time_axis(warp, view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def words(view: View) -> bytes | None:
@@ -106,10 +104,10 @@ def words(view: View) -> bytes | None:
         ax.plot(times, [row - 0.2] * len(times), "v", color=RIGHT, ms=6)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_ylim(len(rows) - 0.5, -0.5)
-    ax.set_title("words: asked (blue; red: key moments) above got (green)", loc="left", fontsize=9.5)
+    _title(ax, "words: asked (blue; red: key moments) above got (green)")
     ax.grid(axis="y", visible=False)
     _time_axis(ax, view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes:
@@ -134,21 +132,39 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     ax.set_ylim(-0.35, top)
     ax.set_aspect("equal")
     ax.axis("off")
-    return _png(canvas)
+    return render_png(canvas)
+
+
+def plain(axes) -> None:
+    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
+    for ax in axes:
+        ax.grid(color="#e6e6e6", lw=0.6)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=8)
+        ax.yaxis.label.set_fontsize(8)
+
+
+def render_png(figure) -> bytes:
+    """The figure as a PNG, which says nothing of the program that drew it."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()
 
 
 def _draw_root(ax, view: View) -> None:
-    ax.set_title("distance from the track", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "distance from the track", "cm")
     if view.wanted is None:
-        return _empty(ax, "no track was given")
+        ax.text(0.5, 0.5, "no track was given", ha="center", va="center", transform=ax.transAxes, fontsize=9,
+                color="#777777")
+        return
     times, pelvis = view.played.times, view.played.pelvis
     error, smooth = root.pelvis_error(pelvis, view.wanted), root.root_error(pelvis, view.wanted, view.fps)
     ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis, as it sways")
     ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
     ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
     ax.set_ylim(bottom=0.0)
-    return _legend(ax, 3)
+    _legend(ax, 3)
 
 
 def _draw_feet(ax, view: View) -> None:
@@ -158,8 +174,7 @@ def _draw_feet(ax, view: View) -> None:
         stands = view.played.contacts[:, side]
         _bars(ax, view, stands, bottom=-5.0 - 4.0 * side, colour=colour, height=3.0)
     ax.set_ylim(bottom=-11.0)
-    ax.set_title("toe heights; bars: foot in contact", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "toe heights; bars: foot in contact", "cm")
     _legend(ax, 2)
 
 
@@ -171,8 +186,7 @@ def _draw_speed(ax, view: View) -> None:
     if view.reference is not None and np.isfinite(view.reference.fastest):
         ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
     ax.set_ylim(bottom=0.0)
-    ax.set_title("speed", loc="left", fontsize=9.5)
-    ax.set_ylabel("m/s")
+    _title(ax, "speed", "m/s")
     _legend(ax, 3)
 
 
@@ -188,8 +202,7 @@ def _draw_smoothness(ax, view: View) -> None:
         label = "seam" if number == 0 else None
         ax.axvline(played.times[seam], color=BALL, lw=0.8, alpha=0.7, zorder=0, label=label)
     ax.set_ylim(bottom=0.0)
-    ax.set_title("smoothness: distance of features (Faustino App. D)", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "smoothness: distance of features (Faustino App. D)", "cm")
     _legend(ax, 3)
 
 
@@ -222,22 +235,15 @@ def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None
         if parent > 0 or (parent == 0 and view.played.body.hips == 0):
             colour = _SIDES.get(side_and_part(skeleton.names[joint])[0], MIDDLE)
             ax.plot(offset + seen[[parent, joint], 0], seen[[parent, joint], 2], color=colour, lw=1.6, zorder=2)
-    ball = _ball(view, frame)
-    if ball is not None:
-        centre = rotate(turn, ball - origin)
+    ball = view.played.ball
+    centre = None if ball is None else ball.positions[np.argmin(np.abs(ball.times - view.played.times[frame]))]
+    if centre is not None and np.isfinite(centre).all():
+        centre = rotate(turn, centre - origin)
         if abs(centre[0]) < 0.55 * _SPACING and abs(centre[1]) < 1.5 and centre[2] < 2.5:
             from matplotlib.patches import Circle
 
             place = (offset + centre[0], centre[2])
             ax.add_patch(Circle(place, BALL_RADIUS, facecolor=BALL, edgecolor="black", lw=0.6, zorder=3))
-
-
-def _ball(view: View, frame: int) -> np.ndarray | None:
-    ball = view.played.ball
-    if ball is None:
-        return None
-    place = ball.positions[int(np.argmin(np.abs(ball.times - view.played.times[frame])))]
-    return place if np.isfinite(place).all() else None
 
 
 def _canvas(rows: int, heights: Sequence[float]):
@@ -250,16 +256,6 @@ def _canvas(rows: int, heights: Sequence[float]):
     return figure, axes
 
 
-def plain(axes) -> None:
-    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
-    for ax in axes:
-        ax.grid(color="#e6e6e6", lw=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=8)
-        ax.yaxis.label.set_fontsize(8)
-
-
 def _time_axis(ax, view: View) -> None:
     ax.set_xlim(view.played.times[0], max(view.played.times[-1], view.played.times[0] + 1.0 / view.fps))
     ax.set_xlabel("seconds on the track's clock", fontsize=8)
@@ -270,11 +266,6 @@ def _legend(ax, columns: int) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False, borderpad=0.1)
 
 
-def _empty(ax, text: str) -> None:
-    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, fontsize=9, color="#777777")
-
-
-def _png(figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
-    return out.getvalue()
+def _title(ax, title: str, unit: str = "") -> None:
+    ax.set_title(title, loc="left", fontsize=9.5)
+    ax.set_ylabel(unit)

@@ -1,6 +1,7 @@
-"""What a library's uncut recordings score themselves, worked out once per library and output rate.
+"""What a library's uncut recordings score themselves, worked out once per library and output rate, and a take beside
+them (`View`).
 
-Measured are the recordings as they are used: brought to the library's skeleton and mended (`library.repair`), which
+Measured are the recordings as they are used: brought to the library's skeleton and repaired (`library.repair`), which
 leaves their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on
 a library of five bodies whose clips nearly all get other feet.
 
@@ -133,31 +134,19 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     hard, speed = (np.concatenate(column) for column in zip(*windows))
     jerk_p95 = jerk.real_p95(hard, speed)
     poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
-    joined = {name: _joined(measured, name) for name in _PER_FRAME}
+    joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED}
     return LibraryReference(
-        fps=fps,
-        index={recording.path: i for i, recording in enumerate(measured)},
-        first=first,
+        fps=fps, index={recording.path: i for i, recording in enumerate(measured)}, first=first,
         rate=np.array([recording.rate for recording in measured]),
         jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
-        travel=_joined(measured, "travel"),
-        heel_rest=float(np.median([recording.heel_rest for recording in measured])),
-        jerk_p95=jerk_p95,
-        smoothness_p95=realism.smoothness_p95(joined["smoothness"], joined["speed"]),
-        poses=poses,
-        pose_p95=pose_p95,
-        fastest=float(joined["speed"].max()),
-        slowest=_slowest_gait(library),
-        **joined,
-    )
+        heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
+        smoothness_p95=realism.smoothness_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
+        fastest=float(joined["speed"].max()), slowest=_slowest_gait(library), **joined,
+    )  # fmt: skip
 
 
-_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness")
-
-
-def _joined(measured: list[Recording], name: str) -> np.ndarray:
-    return np.concatenate([getattr(recording, name) for recording in measured])
+_JOINED = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel")
 
 
 def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
@@ -181,22 +170,14 @@ def measure(clip: Clip, fps: float) -> Recording:
     spans = feet.stances(contacts)
     heel_rest, floor = feet.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
     return Recording(
-        path=clip.path,
-        rate=clip.motion.fps,
-        features=realism.pose_features(skeleton, positions, fps, hips),
-        sway=root.sway(pelvis, fps),
-        surge=root.surge(pelvis, fps),
-        speed=root.travel_speed(pelvis, fps),
+        path=clip.path, rate=clip.motion.fps, features=realism.pose_features(skeleton, positions, fps, hips),
+        sway=root.sway(pelvis, fps), surge=root.surge(pelvis, fps), speed=root.travel_speed(pelvis, fps),
         contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False),
-        heel_rest=heel_rest,
-        support=feet.support_height(planted, contacts, heel_rest),
-        tip=feet.tip_height(skeleton, positions, rotations),
-        jerk=jerk.jerk(positions, fps),
-        smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
-        stances=spans,
-        travel=feet.stance_travel(planted[:, :, 1], spans),
-    )
+        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False), heel_rest=heel_rest,
+        support=feet.support_height(planted, contacts, heel_rest), tip=feet.tip_height(skeleton, positions, rotations),
+        jerk=jerk.jerk(positions, fps), smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
+        stances=spans, travel=feet.stance_travel(planted[:, :, 1], spans),
+    )  # fmt: skip
 
 
 def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
@@ -251,7 +232,8 @@ def _slowest_gait(library: Library) -> float:
 
 
 class View:
-    """What all figures of one report share, worked out once."""
+    """What all figures of one report share, worked out once: the take, the frames of the library it used, its seams,
+    its speed, what was asked."""
 
     def __init__(self, played: Played, track: Track | None, timeline: Timeline | None, library: Library | None):
         motion = played.motion

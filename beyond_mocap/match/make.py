@@ -27,16 +27,16 @@ from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from .folder import check_folder, file_names, opened, read_state
-from .labels.words import MatchWords, words_of
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pieces import stages
 from .pieces.pool import Workplace, check_place, ended
 from .pieces.work import LibrarySource, hold
-from .report.strips import thumbnails
+from .report.pictures import thumbnails
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import begun, now, row_of
+from .words import MatchWords, words_of
 
 AROUND = 5.0
 """Seconds before and behind the span in which the ball is solved too."""

@@ -1,6 +1,7 @@
-"""What a rater fills in: one page that needs no network and sends nothing; the answers are saved as a file.
+"""What raters are asked, about themselves and of every clip (after Faustino App. C), and the page that they fill in.
 
-The page knows neutral names only. Who has no browser for it types into a table with the same questions.
+The page needs no network and sends nothing; the answers are saved as a file. It knows neutral names only. Raters
+without a browser for it type into a table with the same questions.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Clips under neutral names, and in which order each rater sees them (Faustino §5.1.1).
+"""A study: clips under neutral names, in which order each rater sees them (Faustino §5.1.1), and both as a file.
 
 No rater can tell from a name which system made a clip; all see other orders, systems and scenarios mixed; two clips to
-get used to the task come first and do not count.
+get used to the task come first and do not count. Raters must not see study.json, which says who made what.
 """
 
 from __future__ import annotations
@@ -26,7 +26,6 @@ MOST_CLIPS = 500
 _LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
 _LONG = 4  # letters of a clip's name
 _TRIES = 200  # random orders tried until one is new
-
 STUDY_FILE = "study.json"
 VERSION = 1
 COLUMNS = ("file", "system", "scenario")
@@ -105,6 +104,46 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
     return Study(id=mark, seed=seed, pairs=pairs, clips=named, orders=orders)
 
 
+def read_clips(path: Path) -> tuple[Clip, ...]:
+    """The clips of a table `file,system,scenario`, without names; InputError with the line of a row that lacks one."""
+    clips = []
+    for place, row in read_rows(path, COLUMNS, separators=",;\t"):
+        for column in COLUMNS[:2]:
+            if not row[column]:
+                raise InputError(place, f"no {column}", f"{','.join(COLUMNS)} in each row", "complete the row")
+        clips.append(Clip(row["file"], row["system"], row["scenario"]))
+    return tuple(clips)
+
+
+def write_study(folder: Path, study: Study) -> None:
+    """Writes study.json into a folder."""
+    write_report(folder / STUDY_FILE, {
+        "version": VERSION, "study": study.id, "seed": study.seed, "pairs": study.pairs,
+        "clips": [{"name": c.name, "file": c.file, "system": c.system, "scenario": c.scenario} for c in study.clips],
+        "orders": study.orders,
+    })  # fmt: skip
+
+
+def read_study(folder: Path) -> Study:
+    """The study of a folder; InputError where its study.json is missing or is not of that form."""
+    path = Path(folder) / STUDY_FILE
+    text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
+    try:
+        told = json.loads(text)
+        json.dumps(told, ensure_ascii=False).encode("utf-8")  # halves of characters can be read but not written
+        clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
+        names = {clip.name for clip in clips}
+        orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
+        if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
+            raise ValueError("another version")
+        if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
+            raise ValueError(f"{odd!r} is no name")
+        return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        found = f"not of the form of a study ({type(error).__name__}: {error})"
+        raise InputError(path, found, "what 'study order' writes", "make the study again") from None
+
+
 def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
     """One rater's order."""
     first = [clip.name for clip in clips if clip.system == TRAINING]
@@ -144,46 +183,6 @@ def _check(clips: Sequence[Clip]) -> None:
     files = [clip.file for clip in clips]
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise InputError("clips", f"{twice} twice", "a file for each row", "remove one of them")
-
-
-def read_clips(path: Path) -> tuple[Clip, ...]:
-    """The clips of a table `file,system,scenario`, without names; InputError with the line of a row that lacks one."""
-    clips = []
-    for place, row in read_rows(path, COLUMNS, separators=",;\t"):
-        for column in COLUMNS[:2]:
-            if not row[column]:
-                raise InputError(place, f"no {column}", f"{','.join(COLUMNS)} in each row", "complete the row")
-        clips.append(Clip(row["file"], row["system"], row["scenario"]))
-    return tuple(clips)
-
-
-def write_study(folder: Path, study: Study) -> None:
-    """Writes study.json into a folder."""
-    write_report(folder / STUDY_FILE, {
-        "version": VERSION, "study": study.id, "seed": study.seed, "pairs": study.pairs,
-        "clips": [{"name": c.name, "file": c.file, "system": c.system, "scenario": c.scenario} for c in study.clips],
-        "orders": study.orders,
-    })  # fmt: skip
-
-
-def read_study(folder: Path) -> Study:
-    """The study of a folder; InputError where its study.json is missing or is not of that form."""
-    path = Path(folder) / STUDY_FILE
-    text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
-    try:
-        told = json.loads(text)
-        json.dumps(told, ensure_ascii=False).encode("utf-8")  # halves of characters can be read but not written
-        clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
-        names = {clip.name for clip in clips}
-        orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
-        if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
-            raise ValueError("another version")
-        if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
-            raise ValueError(f"{odd!r} is no name")
-        return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
-    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
-        found = f"not of the form of a study ({type(error).__name__}: {error})"
-        raise InputError(path, found, "what 'study order' writes", "make the study again") from None
 
 
 def _shown(row, names: set[str]) -> tuple[str, ...]:

@@ -1,8 +1,11 @@
-"""The analysis of a study as JSON and as one page for a browser, which loads nothing; all names are escaped."""
+"""The analysis of a study as JSON and as one page for a browser, which loads nothing; all names are escaped.
+
+Ratings are drawn as diverging stacked bars: good answers to the right of zero, bad ones to the left, undecided ones
+half on each side (Robbins and Heiberger 2011; Faustino figs. 15 and 16).
+"""
 
 from __future__ import annotations
 
-import io
 import math
 from collections import Counter
 from collections.abc import Sequence
@@ -10,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from ..evaluation import plots
 from ..evaluation.html_page import (
     Html,
     build_image,
@@ -23,7 +25,7 @@ from ..evaluation.html_page import (
     element,
     fragment,
 )
-from ..evaluation.plots import plain
+from ..evaluation.plots import plain, render_png, require_matplotlib
 from ..evaluation.report import rounded
 from .analysis import ALPHA, Analysis, Finding, Shares
 from .form import BACKGROUND, SCALE
@@ -33,7 +35,6 @@ _COLUMNS = (
     ("holm_p", "p, Holm", 4), ("wilcoxon_p", "p, Wilcoxon", 4), ("pooled_p", "p, pooled", 4), ("d", "d", 2),
     ("delta", "delta", 2),
 )  # fmt: skip
-
 COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
 _WIDTH, _DPI = 11.0, 100
 _NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
@@ -58,7 +59,7 @@ def study_report(found: Analysis) -> dict:
 
 def study_page(found: Analysis) -> str:
     """The page as text. InputError where matplotlib is not installed."""
-    plots.require_matplotlib()
+    require_matplotlib()
     unit = "choices: 1 always the first, -1 always the second" if found.study.pairs else "points of the scale"
     drawn = differences(found.findings, f"each rater's mean difference, {unit}")
     return build_page(
@@ -70,11 +71,22 @@ def study_page(found: Analysis) -> str:
     )  # fmt: skip
 
 
+def place_bar(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left edges and widths (5,) in percent of a bar of counts (5,): the middle of the undecided lies at zero."""
+    share = 100.0 * np.asarray(counts, float) / max(float(np.sum(counts)), 1.0)
+    left = np.concatenate([[0.0], np.cumsum(share)[:-1]])
+    return left - (share[:2].sum() + share[2] / 2.0), share
+
+
 def _systems(found: Analysis) -> tuple[Html, Html]:
-    all_of_them, apart = diverging([("", found.by_system)]), diverging(found.by_scenario)
-    table = _table(found.by_system)
-    return (build_section("By system", build_image(all_of_them, "ratings by system"), table),
-            build_section("By scenario", build_image(apart, "ratings by scenario")))  # fmt: skip
+    pictures = (build_image(diverging([("", found.by_system)]), "ratings by system"),
+                build_image(diverging(found.by_scenario), "ratings by scenario"))  # fmt: skip
+    head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
+    rows = [
+        build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
+        for row in found.by_system
+    ]
+    return build_section("By system", pictures[0], build_table(head, rows)), build_section("By scenario", pictures[1])
 
 
 def p_text(p: float) -> str:
@@ -108,14 +120,6 @@ def _findings(found: Analysis) -> Html:
     return fragment(build_table(head, rows), element("p", told, class_="quiet"))
 
 
-def _table(rows: tuple[Shares, ...]) -> Html:
-    head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
-    return build_table(head, [
-        build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
-        for row in rows
-    ])  # fmt: skip
-
-
 def _background(found: Analysis) -> list[Html]:
     parts = []
     for question in BACKGROUND:
@@ -127,7 +131,7 @@ def _background(found: Analysis) -> list[Html]:
 
 
 def _shares(row: Shares) -> dict:
-    return {"name": row.name, "counts": row.counts.tolist(), "mean": row.mean, "sd": row.sd}
+    return {**vars(row), "counts": row.counts.tolist()}
 
 
 def _cell(value: float, digits: int) -> Html:
@@ -135,21 +139,10 @@ def _cell(value: float, digits: int) -> Html:
     return element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
 
 
-def rows_of(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Left edges and widths (5,) in percent of a bar of counts (5,): the middle of the undecided lies at zero."""
-    share = 100.0 * np.asarray(counts, float) / max(float(np.sum(counts)), 1.0)
-    left = np.concatenate([[0.0], np.cumsum(share)[:-1]])
-    return left - (share[:2].sum() + share[2] / 2.0), share
-
-
 def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     """The picture as a PNG: for each group its title and a bar for each of its rows."""
-    from matplotlib.figure import Figure
-
     lines = sum(len(rows) for _, rows in groups) + 0.6 * len(groups)
-    figure = Figure(figsize=(_WIDTH, 1.1 + 0.36 * lines), dpi=_DPI, layout="constrained")
-    ax = figure.subplots()
-    plain([ax])
+    figure, ax = _canvas(1.1 + 0.36 * lines)
     y, ticks, names = 0.0, [], []
     for title, rows in groups:
         if title:
@@ -168,16 +161,12 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     ax.axvline(0.0, color="#333333", lw=0.8)
     handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
     ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8, frameon=False)
-    return _png(figure)
+    return render_png(figure)
 
 
 def differences(findings: Sequence[Finding], unit: str) -> bytes:
     """Each rater's difference as a dot, and the mean with its 95 % interval; a row for each finding."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(_WIDTH, 0.9 + 0.55 * len(findings)), dpi=_DPI, layout="constrained")
-    ax = figure.subplots()
-    plain([ax])
+    figure, ax = _canvas(0.9 + 0.55 * len(findings))
     for row, finding in enumerate(findings):
         spread = row + 0.16 * np.sin(2.4 * np.arange(len(finding.differences)))
         ax.plot(finding.differences, spread, "o", color="#8fb8de", ms=5, alpha=0.8)
@@ -187,11 +176,11 @@ def differences(findings: Sequence[Finding], unit: str) -> bytes:
     ax.set_yticks(range(len(findings)), [f"{finding.new} - {finding.old}" for finding in findings], **_NAME)
     ax.set_ylim(len(findings) - 0.4, -0.6)
     ax.set_xlabel(unit, fontsize=8)
-    return _png(figure)
+    return render_png(figure)
 
 
 def _bar(ax, y: float, counts: np.ndarray) -> None:
-    for left, share, colour, count in zip(*rows_of(counts), COLOURS, counts):
+    for left, share, colour, count in zip(*place_bar(counts), COLOURS, counts):
         ax.barh([y], [share], left=left, color=colour, height=0.72)
         if share >= 4.0:
             dark = colour in (COLOURS[0], COLOURS[-1])
@@ -199,7 +188,11 @@ def _bar(ax, y: float, counts: np.ndarray) -> None:
                     color="white" if dark else "#222222")  # fmt: skip
 
 
-def _png(figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
-    return out.getvalue()
+def _canvas(height: float):
+    """A figure so many inches high, and its axes."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained")
+    ax = figure.subplots()
+    plain([ax])
+    return figure, ax

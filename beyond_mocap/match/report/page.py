@@ -26,6 +26,7 @@ from ...evaluation.html_page import (
 )
 from ...evaluation.report import flat
 from ...synthesis.quality.targets import target_of
+from .pictures import heat_strip, png
 from .results import (
     LIMITS,
     LONGEST,
@@ -37,7 +38,6 @@ from .results import (
     read_match_results,
     worst_seconds,
 )
-from .strips import heat_strip, png
 
 Thumbnail = Callable[[str, float], "np.ndarray | None"]
 """Player's id and second on the match clock -> his picture as `appearance.picture.pose_picture` draws it, or None."""

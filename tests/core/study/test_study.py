@@ -14,7 +14,7 @@ from beyond_mocap.study.analysis import analysed, cliffs_delta, holm, welch
 from beyond_mocap.study.answers import read_answers
 from beyond_mocap.study.form import form_page, form_table, questions_of
 from beyond_mocap.study.order import Clip, ordered, read_study, write_study
-from beyond_mocap.study.page import rows_of, study_page
+from beyond_mocap.study.page import place_bar, study_page
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
 CLIPS = (
@@ -235,9 +235,9 @@ def test_holm_and_cliff_by_hand():
 
 
 def test_bars_are_centred_on_the_undecided():
-    left, width = rows_of(np.array([1, 2, 4, 2, 1]))
+    left, width = place_bar(np.array([1, 2, 4, 2, 1]))
     assert left == pytest.approx([-50.0, -40.0, -20.0, 20.0, 40.0]) and width.sum() == pytest.approx(100.0)
-    left, width = rows_of(np.array([0, 0, 0, 3, 1]))
+    left, width = place_bar(np.array([0, 0, 0, 3, 1]))
     assert left[3] == 0.0 and left[4] + width[4] == pytest.approx(100.0)
 
 

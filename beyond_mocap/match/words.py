@@ -15,15 +15,15 @@ from pathlib import Path
 
 import numpy as np
 
-from ...annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, validate
-from ...annotation.ball_contact import takes_with_foot
-from ...annotation.event_words import EventWords, read_event_words
-from ...ball.tracked import kinds
-from ...ball.tracked.solve import SolvedBall, SolvedTouch
-from ...base.digest import hex_digest
-from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
-from ...files.whole import atomic_write
-from ...motion.track.match_data import Match
+from ..annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, validate
+from ..annotation.ball_contact import takes_with_foot
+from ..annotation.event_words import EventWords, read_event_words
+from ..ball.tracked import kinds
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..base.digest import hex_digest
+from ..files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.whole import atomic_write
+from ..motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned
 
 LEAST_CONFIDENCE = 0.3
