@@ -1,4 +1,9 @@
-"""The one ball of a match: as it was solved, led in everybody's hands and to everybody's feet where he meets it."""
+"""The one ball of a match: as it was solved, led in all players' hands and to their feet where they meet it, and
+players brought to it.
+
+Both keeping out of others' bodies and turning a head move striking parts off the ball by centimetres: `at_ball` brings
+them back.
+"""
 
 from __future__ import annotations
 

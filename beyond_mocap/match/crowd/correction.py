@@ -3,6 +3,11 @@
 The curves are: the root's shift over the ground, each foot's, and by which rotation each arm is turned about its
 shoulder. They are kept as whole tenths of millimetres and of milliradians, so that what is stored and what is in memory
 give the same bits, and are 0 between the pieces in which there is something to change.
+
+A leg whose foot is put elsewhere opens or closes its knee until the ankle is as far from the hip as it has to be, about
+the axis about which it is bent; a leg that is nearly straight and shows none, about the axis square to leg and foot,
+since knees point where toes do. Then the whole leg swings about the hip the shortest way. What comes out of a frame
+depends on no other frame; a foot that stays where it is leaves the leg as it is.
 """
 
 from __future__ import annotations
@@ -105,8 +110,7 @@ def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
-    curves = correction.curves(first, len(motion))
-    return carried(motion, curves)
+    return carried(motion, correction.curves(first, len(motion)))
 
 
 def carried(motion: Motion, curves: np.ndarray) -> Motion:

@@ -1,4 +1,11 @@
-"""One body among many: its capsules over time, what it has of its contacts, and where curves bring it."""
+"""One body among many: its capsules over time, where curves bring it, and which curves its contacts ask for.
+
+These are the least smooth ones that bring it out of its share of each contact. With n the direction away from the
+other, a point that is down its leg by a share f moves by (1 - f) root + f foot, and a point on an arm by turn x arm.
+What is least is, for root and feet together and for each arm by itself, one banded system (`BandedLeastSquares`): the
+squares of what lacks at each contact, of the curves and of their third differences, of a foot's distance from its
+root's shift, and of its speed while it stands.
+"""
 
 from __future__ import annotations
 
@@ -115,6 +122,25 @@ class Calm:
         return cls(body=body, low=low, count=high - low, root_and_feet=whole, arms=tuple(arms))
 
 
+def solve_curves(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
+    """The body's curves (T, 12) with its share of these contacts given way to."""
+    out, parts = np.array(curves), calm.body.parts
+    there = slice(calm.low, calm.low + calm.count)
+    is_arm = np.array([part.limb == "arm" for part in parts])[mine.part]
+    sides = np.array([part.side for part in parts])[mine.part]
+    for side in (0, 1):
+        rows = np.flatnonzero(is_arm & (sides == side))
+        if len(rows):
+            shoulder = placed[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
+            columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
+            out[there, columns] = _arm(calm, side, mine, rows=rows, shoulder=shoulder, turns=curves[:, columns],
+                                       weight=weight)
+    whole = np.flatnonzero(~is_arm | arms_too)
+    if len(whole) or curves[there, : ARMS.start].any():
+        out[there, : ARMS.start] = _root_and_feet(calm, mine, whole, curves, weight)
+    return out
+
+
 def _calm_root_and_feet(body: CrowdBody, curves: np.ndarray, held, fps: float) -> BandedLeastSquares:
     squares, scale = BandedLeastSquares(len(curves), ARMS.start), BASE / fps
     for curve in range(ARMS.start):
@@ -144,25 +170,6 @@ def _hold(squares: BandedLeastSquares, curve: int, values: np.ndarray, held) -> 
         if which:
             index = (np.arange(squares.count) * squares.unknowns + curve)[ends, None]
             squares.add_rows(index, np.ones(1), np.full(len(index), _HELD), values[ends])
-
-
-def given(calm: Calm, mine: Contact, curves, placed, arms_too: bool, weight: float) -> np.ndarray:
-    """The body's curves (T, 12) with its share of these contacts given way to."""
-    out, parts = np.array(curves), calm.body.parts
-    there = slice(calm.low, calm.low + calm.count)
-    is_arm = np.array([part.limb == "arm" for part in parts])[mine.part]
-    sides = np.array([part.side for part in parts])[mine.part]
-    for side in (0, 1):
-        rows = np.flatnonzero(is_arm & (sides == side))
-        if len(rows):
-            shoulder = placed[:, next(n for n, part in enumerate(parts) if part.limb == "arm" and part.side == side), 0]
-            columns = slice(ARMS.start + 3 * side, ARMS.start + 3 * side + 3)
-            out[there, columns] = _arm(calm, side, mine, rows=rows, shoulder=shoulder, turns=curves[:, columns],
-                                       weight=weight)
-    whole = np.flatnonzero(~is_arm | arms_too)
-    if len(whole) or curves[there, : ARMS.start].any():
-        out[there, : ARMS.start] = _root_and_feet(calm, mine, whole, curves, weight)
-    return out
 
 
 def _arm(calm: Calm, side: int, mine: Contact, rows, shoulder, turns, weight: float) -> np.ndarray:

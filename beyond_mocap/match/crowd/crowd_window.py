@@ -1,5 +1,5 @@
-"""A window of time with everybody in it: bodies that would be in each other kept apart, and the ball where they meet
-it."""
+"""A window of time with all players in it: bodies that would be in each other kept apart, and the ball where they meet
+it; what the window says is kept in a file until it is needed again (never pickled)."""
 
 from __future__ import annotations
 
@@ -124,9 +124,9 @@ def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
         led.append(off[mine])
         core = slice(max(inside[0] - first, 0), max(inside[1] - first, 0))
         before = max(before, float(deep[core].max(initial=0.0)))
-    return CrowdPart(correction=in_turn([correction for correction, *_ in rows], fps), frames=np.concatenate(frames),
-                     depth=np.concatenate(depth), before=before, led_frames=np.concatenate(led_frames),
-                     led=np.concatenate(led))  # fmt: skip
+    found = {"frames": frames, "depth": depth, "led_frames": led_frames, "led": led}
+    return CrowdPart(correction=in_turn([correction for correction, *_ in rows], fps), before=before,
+                     **{name: np.concatenate(values) for name, values in found.items()})  # fmt: skip
 
 
 def in_turn(corrections: Sequence[Correction], fps: float) -> Correction:

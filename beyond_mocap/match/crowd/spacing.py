@@ -1,4 +1,5 @@
-"""Tracks that come nearer than two trunks allow pushed apart, before anything is made from them.
+"""Which bodies come near each other and when, and tracks that come nearer than two trunks allow pushed apart, before
+anything is made from them.
 
 The shifts are the least smooth ones: sum STAY (|s|^2 + SECONDS^6 |s'''|^2) over everybody, plus the square of what is
 lacking of the distance while two are too near. Which way they are pushed turns with how they lie to each other; where
@@ -33,9 +34,37 @@ _TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over
 _ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
 _HELD = 1e6  # weight that holds a value: far above all others
 
-
 Span = tuple[int, int, tuple[int, int]]
 """First frame, end, and the numbers of two bodies."""
+
+
+def spaced(
+    times: np.ndarray, positions: np.ndarray, keep: np.ndarray | None = None, distance: float = DISTANCE
+) -> np.ndarray:
+    """(P, N, 2) m by which P bodies give way to each other.
+
+    times (N,) s, rising evenly; positions (P, N, 2) m, NaN where somebody is not there; keep (P, N): how firmly each
+    keeps his way against the others', 1 by default (`keeping`). Shifts are 0 but around meetings, and at the first and
+    last frame.
+    """
+    shifts = np.zeros(positions.shape)
+    if len(times) < 4:
+        return shifts
+    fps = (len(times) - 1) / (times[-1] - times[0])
+    firm = np.ones(positions.shape[:2]) if keep is None else keep
+    for episode in episodes(positions, distance, round(REACH * fps)):
+        span, bodies = slice(episode.first, episode.end), list(episode.bodies)
+        shifts[bodies, span] = _pushed(episode, positions[bodies, span], firm[bodies, span], distance, fps)
+    return np.where(np.isfinite(positions), shifts, 0.0)
+
+
+def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
+    """(T,) how firmly somebody keeps his way who touches the ball at frames `moments` (K,): STEADY there, 1 from
+    `seconds` before and behind on."""
+    if not len(moments):
+        return np.ones(count)
+    away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
+    return 1.0 + (STEADY - 1.0) * np.cos(0.5 * np.pi * np.clip(away, 0.0, 1.0)) ** 2
 
 
 @dataclass(frozen=True)
@@ -91,35 +120,6 @@ def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
         if not more:
             return found
         spans += more
-
-
-def spaced(
-    times: np.ndarray, positions: np.ndarray, keep: np.ndarray | None = None, distance: float = DISTANCE
-) -> np.ndarray:
-    """(P, N, 2) m by which P bodies give way to each other.
-
-    times (N,) s, rising evenly; positions (P, N, 2) m, NaN where somebody is not there; keep (P, N): how firmly each
-    keeps his way against the others', 1 by default (`keeping`). Shifts are 0 but around meetings, and at the first and
-    last frame.
-    """
-    shifts = np.zeros(positions.shape)
-    if len(times) < 4:
-        return shifts
-    fps = (len(times) - 1) / (times[-1] - times[0])
-    firm = np.ones(positions.shape[:2]) if keep is None else keep
-    for episode in episodes(positions, distance, round(REACH * fps)):
-        span, bodies = slice(episode.first, episode.end), list(episode.bodies)
-        shifts[bodies, span] = _pushed(episode, positions[bodies, span], firm[bodies, span], distance, fps)
-    return np.where(np.isfinite(positions), shifts, 0.0)
-
-
-def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -> np.ndarray:
-    """(T,) how firmly somebody keeps his way who touches the ball at frames `moments` (K,): STEADY there, 1 from
-    `seconds` before and behind on."""
-    if not len(moments):
-        return np.ones(count)
-    away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
-    return 1.0 + (STEADY - 1.0) * np.cos(0.5 * np.pi * np.clip(away, 0.0, 1.0)) ** 2
 
 
 def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: float, fps: float) -> np.ndarray:
