@@ -29,11 +29,9 @@ def place(view: View) -> dict:
     """Root and pelvis error, surge, speed coverage."""
     pelvis, fps = view.played.pelvis, view.fps
     own = _mean(view.own("sway"))
-    out = {
-        "root_error_m": dict.fromkeys(("mean", "p95", "max")),
-        "pelvis_error_m": {"mean": None, "own": own, "keys": None},
-        "speed_coverage": {"above": None, "below": None},
-    }
+    out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
+           "pelvis_error_m": {"mean": None, "own": own, "keys": None},
+           "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.wanted is not None:
         error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
         out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
@@ -93,16 +91,13 @@ def skate_and_ground(view: View) -> dict:
         "skate": {
             "contact_cm_s": 100.0 * _mean(feet.contact_speeds(planted, played.contacts, fps)),
             "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
-            "stance_mm_median": 1000.0 * _median(travel),
-            "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
-            "gmd_ratio": _mean(skating),
-            "source_gmd_ratio": _mean(view.own("skating")),
+            "stance_mm_median": 1000.0 * _median(travel), "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
+            "gmd_ratio": _mean(skating), "source_gmd_ratio": _mean(view.own("skating")),
             "source_stance_mm_median": 1000.0 * _median(own),
             "source_stances_over_21mm": _mean(own > feet.NOTICED_SLIDE),
         },
         "ground_mm": {
-            "min": 1000.0 * float(played.positions[..., 2].min()),
-            "support_max": 1000.0 * _max(support),
+            "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _max(support),
             "source_support_max": 1000.0 * _max(view.own("support")),
             "tip_min": -1000.0 * _max(-feet.tip_height(played.motion.skeleton, played.positions, played.rotations)),
             "source_tip_min": -1000.0 * _max(-view.own("tip")),

@@ -28,7 +28,7 @@ MOST_LAG = 300.0
 """Seconds by which clocks may differ: a feed whose clock begins elsewhere, if enough of its events say so."""
 
 WINDOW = 2.0
-"""Seconds from its place on the mended clock within which an event's touch is looked for."""
+"""Seconds from its place on the corrected clock within which an event's touch is looked for."""
 
 _BIN = 0.1  # s of lag that are told apart
 _SPREAD = 0.5  # s by which lags of one period scatter

@@ -1,9 +1,9 @@
-"""The motion of any span of a player, out of his edit list.
+"""The motion of any span of a player, out of their edit list; takes of a player joined, and cut.
 
-He is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the next at
-their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same; only the
-signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are in
-memory beside what comes out.
+A player is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the
+next at their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same;
+only the signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are
+in memory beside what comes out.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from ..synthesis.search.footage import shown
 from ..synthesis.synthesize import constructed
 from ..synthesis.take import DribbleTouch, Take
 from .pieces.named_edit import bound, part
-from .pieces.units import cut_plan, frame_count, layout_edges
+from .pieces.units import cut_plan, frame_count, window_edges
 from .player_edit import PlayerEdit, Stretch
 
 AROUND = 4.0
@@ -95,7 +95,7 @@ class _Layout:
         self.library = with_chosen_gaits(library.extended if made else library, dict(self.plan.gaits))
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
         self.count = frame_count(self.plan, self.fps)
-        self.edges = layout_edges(self.begin, self.count, self.fps, window)
+        self.edges = window_edges(self.begin, self.count, window, self.fps, step=1)
 
     def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
         """Frames from `start` to `end` s; None where there are fewer than two."""

@@ -1,4 +1,5 @@
-"""What is asked of a match: plain values, and the digest by which results of the same order are known again."""
+"""What is asked of a match: plain values, and the digests by which work that was done already is found again: the same
+content has the same name in every process and on every machine."""
 
 from __future__ import annotations
 
@@ -79,9 +80,6 @@ class MatchOrder:
             raise InputError("window", f"{self.window:g} s", f"{WINDOWS[0]:g} to {WINDOWS[1]:g} s")
         if not 1.0 <= self.overlap <= self.window / 2.0:
             raise InputError("overlap", f"{self.overlap:g} s", f"1 s to half of the window, {self.window / 2.0:g} s")
-        self._check_events()
-
-    def _check_events(self) -> None:
         for option, value in (("--events-meta", self.events_meta), ("--events-provider", self.events_provider)):
             if value and self.events is None:
                 raise InputError(option, f"{value}, without --events", "--events FILE too", "name the events")
@@ -117,7 +115,7 @@ def identity(order: MatchOrder, library_key: str) -> dict[str, object]:
 
 def digest_of(*values: object) -> str:
     """Hex digits that stand for the content of `values`: plain values, arrays, and dataclasses, tuples and mappings of
-    such, however deep. TypeError for anything else, which has no content that could be told."""
+    such, however deep. TypeError for anything else."""
     hashed = hashlib.blake2b(digest_size=_LENGTH)
     _feed(hashed, values)
     return hashed.hexdigest()

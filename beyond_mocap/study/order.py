@@ -71,10 +71,6 @@ class Study:
         """Names of the two clips that do not count."""
         return tuple(clip.name for clip in self.clips if clip.system == TRAINING)
 
-    def clip(self, name: str) -> Clip:
-        """The clip of a neutral name; KeyError where there is none."""
-        return {clip.name: clip for clip in self.clips}[name]
-
     def counts(self, shown: Sequence[str]) -> bool:
         """Whether what is shown together counts."""
         return not set(shown) & set(self.training)

@@ -1,5 +1,6 @@
 """An edit list that names its clips by path and counts their own frames, so that it fits the library whenever that is
-built again, and is as small as it can be: runs of frames that follow each other evenly."""
+built again, and is as small as it can be: runs of frames that follow each other evenly. `named` makes it of a
+library's own edit list, `bound` the other way round."""
 
 from __future__ import annotations
 

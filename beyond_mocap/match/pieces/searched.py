@@ -1,4 +1,5 @@
-"""What the search finds for one window: no motion yet, only which clip is shown when."""
+"""What the search finds for one window: no motion yet, only which clip is shown when; kept in a file until it is needed
+again (never pickled)."""
 
 from __future__ import annotations
 

@@ -49,8 +49,11 @@ def spliced(
     for number, plan in enumerate(plans):
         plan = kept(plan)
         mine = sorted((piece for piece in pieces if piece.stretch == number), key=lambda piece: piece.number)
-        _check(plan, mine)
-        edit, found = _joined(library, plan, mine)
+        numbers = [piece.number for piece in mine]
+        if not mine or numbers != list(range(len(mine))):
+            found = f"windows {', '.join(map(str, numbers)) or 'none'} of {plan.track.name}"
+            raise InputError("match", found, "all windows of a stretch", "search the others too")
+        edit, joined = _joined(library, plan, mine)
         begin = float(plan.track.times[0])
         warnings = tuple(dict.fromkeys(line for piece in mine for line in piece.warnings))
         short = tuple(
@@ -58,14 +61,8 @@ def spliced(
             for piece in mine if piece.hurried is not None
         )  # fmt: skip
         stretches.append(Stretch(plan, edit, warnings, short))
-        joints += found
+        joints += joined
     return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)
-
-
-def _check(plan: Plan, pieces: list[Piece]) -> None:
-    if not pieces or [piece.number for piece in pieces] != list(range(len(pieces))):
-        found = f"windows {', '.join(str(piece.number) for piece in pieces) or 'none'} of {plan.track.name}"
-        raise InputError("match", found, "all windows of a stretch", "search the others too")
 
 
 def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
@@ -117,12 +114,9 @@ def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, 
     for seam in (*leaves.seams, *enters.seams):
         cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))
     for key in (*before.edit.keys, *after.edit.keys):
-        rate = FPS / library.clips[_clip(library, before.edit.clips[key.clip])].motion.fps
+        name = before.edit.clips[key.clip]
+        rate = FPS / next(clip for clip in library.clips if (clip.path, clip.mirrored) == name).motion.fps
         entry, leave = (max(AROUND, seconds * rate) for seconds in (key.frame - key.start, key.end - key.frame))
         middle = _frame(plan, key) - low
         cost += _NEAR_KEY * ((at > middle - entry) & (at < middle + leave))
     return cost
-
-
-def _clip(library: Library, name: tuple[str, bool]) -> int:
-    return next(number for number, clip in enumerate(library.clips) if (clip.path, clip.mirrored) == name)

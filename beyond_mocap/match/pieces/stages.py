@@ -21,9 +21,8 @@ from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in
 from ..folder import MatchFolder
 from ..order import FORM, MatchOrder, digest_of
 from ..parts import Part
-from ..player_edit import PlayerEdit
+from ..player_edit import PlayerEdit, write_player
 from ..state import MatchState
-from ..take_npz import write_player
 from .pool import Failed, Workplace, run
 from .searched import Piece, keep_piece, kept_piece
 from .splice import spliced
@@ -49,10 +48,6 @@ class Job:
     place: Workplace
     report: Report
     cancelled: Callable[[], bool] | None = None
-
-    def told(self, report: Report) -> Job:
-        """The same, telling another."""
-        return replace(self, report=report)
 
     def named(self, *values: object) -> str:
         """The name of a piece of work that depends on the library and on `values`."""
@@ -80,7 +75,8 @@ class _Search:
         self._count = 0
         order = job.order
         for player, part in self._parts.items():
-            units = sum(len(units_of(_bare(plan), 0, order.window, order.overlap)) for plan in part.plans)
+            bare = (replace(plan, timeline=Timeline(), solved=None, solve_touches=False) for plan in part.plans)
+            units = sum(len(units_of(plan, 0, order.window, order.overlap)) for plan in bare)  # of the track alone
             job.state.players[player]["units"] = units
             self._count += units
 
@@ -141,11 +137,6 @@ class _Search:
         return self._job.state.players[player]["status"] == "failed"
 
 
-def _bare(plan):
-    """The plan for counting its windows: they depend on its track alone."""
-    return replace(plan, timeline=Timeline(), solved=None, solve_touches=False)
-
-
 def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
     """What the whole span says of each player, by id: windows of everybody on the match's clock."""
     players, names = list(edits), {}
@@ -186,10 +177,8 @@ def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
     """Edit lists without the library's place, on which their motion does not depend."""
-    def bare(stretch):
-        return replace(stretch, plan=replace(stretch.plan, library=""))
-
-    return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
+    bare = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches] for edit in edits]
+    return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, bare))
 
 
 def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:

@@ -66,7 +66,10 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     two neighbours share. Key moments are moved to the touches they mean before the plan is cut. InputError
     for a window or an overlap that leaves no sense.
     """
-    _check(window, overlap)
+    if not 5.0 <= window <= 3600.0:
+        raise InputError("--window", f"{window:g} s", "5 to 3600 s")
+    if not 1.0 <= overlap <= window / 2.0:
+        raise InputError("--overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")
     plan = kept(plan)
     begin, count = float(plan.track.times[0]), frame_count(plan)
     edges = window_edges(begin, count, window)
@@ -81,37 +84,20 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
     return tuple(units)
 
 
-def layout_edges(begin: float, count: int, fps: float, window: float) -> list[int]:
-    """Frames, at `fps`, between which the windows lie in which a stretch is laid out: as `window_edges`, but to the
-    nearest frame, so that a part of a stretch has the same ones."""
-    return _edges(begin, count, fps, window, 1)
-
-
 def frame_count(plan: Plan, fps: float = FPS) -> int:
     """Frames of the plan's track at `fps`, as `motion.track.sample` counts them."""
     return int(np.floor((plan.track.times[-1] - plan.track.times[0]) * fps + 1e-6)) + 1
 
 
-def window_edges(begin: float, count: int, window: float) -> list[int]:
-    """Frames, at the library's rate, between which the windows of a stretch lie: it begins at `begin` s and has `count`
-    frames. A first or last window that would be short goes to its neighbour."""
-    return _edges(begin, count, FPS, window, SLOT)
-
-
-def _edges(begin: float, count: int, fps: float, window: float, step: int) -> list[int]:
-    """0, the multiples of `step` frames nearest to multiples of `window` s on the match's clock, and count."""
+def window_edges(begin: float, count: int, window: float, fps: float = FPS, step: int = SLOT) -> list[int]:
+    """Frames, at `fps`, between which the windows of a stretch lie, which begins at `begin` s and has `count` frames:
+    0, the multiples of `step` frames nearest to multiples of `window` s on the match's clock, and count. A first or
+    last window that would be short goes to its neighbour. With a step of 1 a part of a stretch has the same ones."""
     end = begin + count / fps
     numbers = range(int(np.floor(begin / window)) + 1, int(np.ceil(end / window)))
     inner = [step * round((number * window - begin) * fps / step) for number in numbers]
     least = _SHORTEST * window * fps
     return [0, *(edge for edge in inner if least <= edge <= count - least), count]
-
-
-def _check(window: float, overlap: float) -> None:
-    if not 5.0 <= window <= 3600.0:
-        raise InputError("--window", f"{window:g} s", "5 to 3600 s")
-    if not 1.0 <= overlap <= window / 2.0:
-        raise InputError("--overlap", f"{overlap:g} s", f"1 s to half of the window, {window / 2.0:g} s")
 
 
 def cut_plan(plan: Plan, start: float, end: float) -> Plan:

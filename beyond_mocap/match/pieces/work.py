@@ -1,5 +1,6 @@
 """The three kinds of work that a match is made of, as functions that any process can be given: each takes all that it
-needs, but the library, which a worker reads by itself."""
+needs, but the library, which a worker reads by itself, once, and the same one everywhere. The last one makes a player's
+files: with the figures of every report over all stretches, and second by second."""
 
 from __future__ import annotations
 
@@ -44,7 +45,7 @@ class LibrarySource:
     key: str = ""
 
 
-_lock = threading.Lock()
+_lock = threading.RLock()
 _held: dict[LibrarySource, Library] = {}
 
 
@@ -56,16 +57,12 @@ def library_of(source: LibrarySource) -> Library:
     """
     with _lock:  # several threads of one worker ask at once
         if source not in _held:
-            built = build(
-                source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit, seed=source.seed
-            )
+            built = build(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
+                          seed=source.seed)
             if source.key and built.kept[1] != source.key:
-                raise InputError(
-                    source.folder, "another library than the one this work was ordered with",
-                    "the same recordings and the same numpy for all workers", "start the command again",
-                )
-            _held.clear()
-            _held[source] = built
+                raise InputError(source.folder, "another library than the one this work was ordered with",
+                                 "the same recordings and the same numpy for all workers", "start the command again")
+            hold(source, built)
         return _held[source]
 
 
@@ -104,9 +101,7 @@ def search_unit(source: LibrarySource, unit: Unit) -> Piece:
     return searched(library_of(source), unit)
 
 
-def part_crowd(
-    source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float
-) -> tuple[CrowdPart, ...]:
+def part_crowd(source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
     """Keeps everybody apart in one window."""
     return crowd_window(library_of(source), edits, start, end)
 
@@ -120,47 +115,17 @@ def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
         plans = [stretch.plan for stretch in order.edit.stretches]
         span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
         takes = shown(library, order.edit, order.ball, *span)
-        files = {}
-        report = None
+        files, report = {}, None
         if order.figures:
             overlap = [_overlap(take, order) for take in takes]
             report = player_report(library, takes, order.measured, overlap, order.ball)
-            table = in_turn([provenance_of(take) for take in takes])
+            table = _join_provenance([provenance_of(take) for take in takes])
             files["provenance.csv"] = _written(lambda path: write_provenance(path, table))
         if order.bvh:
             for number, take in enumerate(takes, 1):
                 ending = "bvh" if number == 1 else f"{number}.bvh"
                 files[ending] = _written(lambda path, take=take: bvh.write(path, take.motion))
     return PlayerFiles(report, files)
-
-
-def _overlap(take: Take, order: Finish) -> np.ndarray:
-    """(T,) m by which a take's body is in others."""
-    out = np.zeros(len(take.motion))
-    at = order.frames - round(take.start_time * take.motion.fps)
-    inside = (at >= 0) & (at < len(out))
-    out[at[inside]] = order.depth[inside]
-    return out
-
-
-def in_turn(tables: Sequence[Provenance]) -> Provenance:
-    """The provenance of several stretches, one behind the other."""
-    return Provenance(
-        times=np.concatenate([one.times for one in tables]),
-        clip=tuple(clip for one in tables for clip in one.clip),
-        clip_frame=np.concatenate([one.clip_frame for one in tables]),
-        mirrored=np.concatenate([one.mirrored for one in tables]),
-        words=tuple(words for one in tables for words in one.words),
-        contacts=np.concatenate([one.contacts for one in tables]),
-    )
-
-
-def _written(write) -> bytes:
-    """What `write(path)` writes."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "content"
-        write(path)
-        return path.read_bytes()
 
 
 def player_report(
@@ -185,26 +150,6 @@ def combined(reports: Sequence[dict], weights: Sequence[float]) -> dict:
     if len(reports) == 1:
         return dict(reports[0])
     return {name: _joined(name, [one.get(name) for one in reports], weights) for name in reports[0]}
-
-
-def _joined(name: str, values: list, weights: Sequence[float]):
-    known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
-    if not known:
-        return None
-    first = known[0][0]
-    if isinstance(first, dict):
-        kept = [weight for _, weight in known]
-        return {key: _joined(key, [value.get(key) for value, _ in known], kept) for key in first}
-    if isinstance(first, list):
-        return [entry for value, _ in known for entry in value]
-    if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
-        return first
-    numbers = np.array([value for value, _ in known], dtype=float)
-    if name in _MOST or name in _LEAST or name in _SUMMED:
-        done = numbers.max() if name in _MOST else numbers.min() if name in _LEAST else numbers.sum()
-    else:
-        done = np.average(numbers, weights=[weight for _, weight in known])
-    return int(done) if isinstance(first, int) and name in _SUMMED else float(done)
 
 
 def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
@@ -235,6 +180,51 @@ def per_second(
                 found = found[np.isfinite(found)]
                 rows[name][number] = float(over(found)) if len(found) else None
     return {"start_s": start, **rows}
+
+
+def _overlap(take: Take, order: Finish) -> np.ndarray:
+    """(T,) m by which a take's body is in others."""
+    out = np.zeros(len(take.motion))
+    at = order.frames - round(take.start_time * take.motion.fps)
+    inside = (at >= 0) & (at < len(out))
+    out[at[inside]] = order.depth[inside]
+    return out
+
+
+def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
+    """The provenance of several stretches, one behind the other."""
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables])
+              for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
+    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
+                      words=tuple(words for one in tables for words in one.words), **arrays)
+
+
+def _written(write) -> bytes:
+    """What `write(path)` writes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "content"
+        write(path)
+        return path.read_bytes()
+
+
+def _joined(name: str, values: list, weights: Sequence[float]):
+    known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
+    if not known:
+        return None
+    first = known[0][0]
+    if isinstance(first, dict):
+        kept = [weight for _, weight in known]
+        return {key: _joined(key, [value.get(key) for value, _ in known], kept) for key in first}
+    if isinstance(first, list):
+        return [entry for value, _ in known for entry in value]
+    if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
+        return first
+    numbers = np.array([value for value, _ in known], dtype=float)
+    if name in _MOST or name in _LEAST or name in _SUMMED:
+        done = numbers.max() if name in _MOST else numbers.min() if name in _LEAST else numbers.sum()
+    else:
+        done = np.average(numbers, weights=[weight for _, weight in known])
+    return int(done) if isinstance(first, int) and name in _SUMMED else float(done)
 
 
 def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):

@@ -151,13 +151,9 @@ def _teams(match: MatchResults, span: tuple[float, float], anchors, everybody: t
         if own:
             table = team_table(own, strips, anchors, everybody)
             parts.append(build_section(fragment(dot, team.name or "No team"), table))
-    return [*parts, _legend()] if parts else []
-
-
-def _legend() -> Html:
     told = ("Strips: the worst figure of every second; green far below its limit, amber at it, red beyond, grey where "
             "the player has no motion. Green and red figures: target met or not.")  # fmt: skip
-    return element("p", told, class_="quiet")
+    return [*parts, element("p", told, class_="quiet")] if parts else []
 
 
 def _players(match: MatchResults, worst: tuple[WorstSecond, ...], span, anchors, everybody: tuple[str, ...]) -> Html:

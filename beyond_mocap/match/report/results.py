@@ -1,4 +1,5 @@
-"""What a folder with a match holds of its players: read from match.json and the players' reports, whole or not."""
+"""What a folder with a match holds of its players, read from match.json and the players' reports, whole or not; and
+which seconds came out worst, of all players."""
 
 from __future__ import annotations
 
@@ -20,7 +21,6 @@ FIGURES = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
 LONGEST = 6 * 3600
 """Most seconds of one match that a page shows."""
 _LATEST = 1e11  # seconds: some clocks count from 1970
-
 LIMITS = {"root_error_m": 0.015, "skate_cm_s": 7.0, "overlap_m": 0.02}
 """Figure -> what it is to stay below in a second: 1.5 cm off the track, two bodies 2 cm into each other; 7 cm/s is a
 standing foot that goes 21 mm, which eyes notice, within a step of 0.3 s."""

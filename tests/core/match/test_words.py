@@ -97,7 +97,7 @@ def test_most_planted_touches_come_back_as_words_of_their_player(planted):
         m.source == TOUCHES and LEAST_CONFIDENCE <= m.confidence <= 1.0 for ms in words.players.values() for m in ms
     )
     for player in match.players:
-        validate(words.timeline(player.id), start=0.0, end=40.0)
+        validate(timeline_of(words.players[player.id]), start=0.0, end=40.0)
 
 
 def test_without_a_ball_nobody_has_words(planted):
