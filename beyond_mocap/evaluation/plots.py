@@ -41,9 +41,8 @@ def require_matplotlib() -> None:
 
 def curves(view: View) -> bytes:
     """Root error, feet, speed and steadiness over time, one above the other."""
-    panels = [_draw_root, _draw_feet, _draw_speed, _draw_smoothness]
-    canvas, axes = _canvas(len(panels), [2.0, 2.0, 2.0, 1.6])
-    for draw, ax in zip(panels, axes):
+    canvas, axes = _canvas(2.0, 2.0, 2.0, 1.6)
+    for draw, ax in zip((_draw_root, _draw_feet, _draw_speed, _draw_smoothness), axes):
         draw(ax, view)
         _mark_moments(ax, view)
     _time_axis(axes[-1], view)
@@ -64,7 +63,7 @@ def legend(view: View) -> dict[int, tuple[int, str]]:
 
 def clips(view: View) -> bytes:
     """Which clip is played when, by the numbers of `legend`, with its seams, and how fast it is played."""
-    canvas, (bar, warp) = _canvas(2, [0.8, 1.4])
+    canvas, (bar, warp) = _canvas(0.8, 1.4)
     names = legend(view)
     edges = [0, *view.seams, view.count]
     for low, high in zip(edges[:-1], edges[1:]):
@@ -96,7 +95,7 @@ def words(view: View) -> bytes | None:
     rows = rows[:_MOST_ROWS]
     if not rows:
         return None
-    canvas, (ax,) = _canvas(1, [0.5 + 0.24 * len(rows)])
+    canvas, (ax,) = _canvas(0.5 + 0.24 * len(rows))
     for row, word in enumerate(rows):
         _bars(ax, view, np.array([word in (w or ()) for w in asked]), row - 0.38, "#8fb8de")
         _bars(ax, view, np.array([word in w for w in got]), row + 0.02, "#3c7d4e")
@@ -121,7 +120,7 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     turn = about_up(np.array(-facing + np.radians(20.0)))
     top = max(1.6, float(view.played.positions[list(frames), :, 2].max()) + 0.15)
     span = len(frames) * _SPACING
-    canvas, (ax,) = _canvas(1, [(top + 0.35) * WIDTH / span])
+    canvas, (ax,) = _canvas((top + 0.35) * WIDTH / span)
     for number, frame in enumerate(frames):
         _figure(ax, view, frame, turn, number * _SPACING)
         weight = "bold" if frame == marked else "normal"
@@ -133,6 +132,16 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     ax.set_aspect("equal")
     ax.axis("off")
     return render_png(canvas)
+
+
+def create_canvas(height: float, rows: int = 1, columns: int = 1, **layout):
+    """A figure without a window, so many inches high, and its axes row by row. layout: as `Figure.subplots` has it."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **layout).ravel()
+    plain(axes)
+    return figure, axes
 
 
 def plain(axes) -> None:
@@ -246,14 +255,10 @@ def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None
             ax.add_patch(Circle(place, BALL_RADIUS, facecolor=BALL, edgecolor="black", lw=0.6, zorder=3))
 
 
-def _canvas(rows: int, heights: Sequence[float]):
-    """A figure without a window, and its axes from above."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, sum(heights) + 0.1 * rows), dpi=DPI, layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})[:, 0]
-    plain(axes)
-    return figure, axes
+def _canvas(*heights: float):
+    """A figure of panels so many inches high above one another, and their axes."""
+    rows = len(heights)
+    return create_canvas(sum(heights) + 0.1 * rows, rows, sharex=True, gridspec_kw={"height_ratios": heights})
 
 
 def _time_axis(ax, view: View) -> None:

@@ -141,7 +141,7 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
         jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
         heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
-        smoothness_p95=realism.smoothness_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
+        smoothness_p95=realism.real_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
         fastest=float(joined["speed"].max()), slowest=_slowest_gait(library), **joined,
     )  # fmt: skip
 

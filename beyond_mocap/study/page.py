@@ -25,7 +25,7 @@ from ..evaluation.html_page import (
     element,
     fragment,
 )
-from ..evaluation.plots import plain, render_png, require_matplotlib
+from ..evaluation.plots import create_canvas, render_png, require_matplotlib
 from ..evaluation.report import rounded
 from .analysis import ALPHA, Analysis, Finding, Shares
 from .form import BACKGROUND, SCALE
@@ -36,7 +36,6 @@ _COLUMNS = (
     ("delta", "delta", 2),
 )  # fmt: skip
 COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
-_WIDTH, _DPI = 11.0, 100
 _NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
 
 
@@ -142,7 +141,7 @@ def _cell(value: float, digits: int) -> Html:
 def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
     """The picture as a PNG: for each group its title and a bar for each of its rows."""
     lines = sum(len(rows) for _, rows in groups) + 0.6 * len(groups)
-    figure, ax = _canvas(1.1 + 0.36 * lines)
+    figure, (ax,) = create_canvas(1.1 + 0.36 * lines)
     y, ticks, names = 0.0, [], []
     for title, rows in groups:
         if title:
@@ -166,7 +165,7 @@ def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
 
 def differences(findings: Sequence[Finding], unit: str) -> bytes:
     """Each rater's difference as a dot, and the mean with its 95 % interval; a row for each finding."""
-    figure, ax = _canvas(0.9 + 0.55 * len(findings))
+    figure, (ax,) = create_canvas(0.9 + 0.55 * len(findings))
     for row, finding in enumerate(findings):
         spread = row + 0.16 * np.sin(2.4 * np.arange(len(finding.differences)))
         ax.plot(finding.differences, spread, "o", color="#8fb8de", ms=5, alpha=0.8)
@@ -186,13 +185,3 @@ def _bar(ax, y: float, counts: np.ndarray) -> None:
             dark = colour in (COLOURS[0], COLOURS[-1])
             ax.text(left + share / 2.0, y, str(int(count)), ha="center", va="center", fontsize=8,
                     color="white" if dark else "#222222")  # fmt: skip
-
-
-def _canvas(height: float):
-    """A figure so many inches high, and its axes."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(_WIDTH, height), dpi=_DPI, layout="constrained")
-    ax = figure.subplots()
-    plain([ax])
-    return figure, ax

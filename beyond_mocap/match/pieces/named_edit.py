@@ -164,8 +164,6 @@ def bound(library: Library, edit: NamedEdit, moments: Sequence[KeyMoment] = ()) 
     clip, local = edit.frames()
     pool = library.frames.first[number[clip]] + local
     wanted = {moment.time: index for index, moment in enumerate(moments)}
-    keys = [
-        PlacedKey(wanted[key.time], Key(int(number[key.clip]), key.frame, key.start, key.end, frozenset(key.words)))
-        for key in edit.keys if key.time in wanted
-    ]  # fmt: skip
+    keys = [PlacedKey(wanted[key.time], Key(int(number[key.clip]), key.frame, key.start, key.end, frozenset(key.words)))
+            for key in edit.keys if key.time in wanted]  # fmt: skip
     return EditList(number[clip], pool, edit.seams, tuple(sorted(keys, key=lambda key: key.wanted)))

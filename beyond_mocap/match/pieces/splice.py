@@ -56,10 +56,8 @@ def spliced(
         edit, joined = _joined(library, plan, mine)
         begin = float(plan.track.times[0])
         warnings = tuple(dict.fromkeys(line for piece in mine for line in piece.warnings))
-        short = tuple(
-            (begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
-            for piece in mine if piece.hurried is not None
-        )  # fmt: skip
+        short = tuple((begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
+                      for piece in mine if piece.hurried is not None)  # fmt: skip
         stretches.append(Stretch(plan, edit, warnings, short))
         joints += joined
     return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)

@@ -16,8 +16,7 @@ from ...files.tables import plain
 from ...files.whole import atomic_write
 from ...library.library import Library
 from ...motion.track.ball_path import BallPath
-from ..crowd.correction import joined
-from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn, keep_parts, kept_parts
+from ..crowd.crowd_window import BEYOND, LONGEST, CrowdPart, cut_edit, join_windows, keep_parts, kept_parts
 from ..folder import MatchFolder
 from ..order import FORM, MatchOrder, digest_of
 from ..parts import Part
@@ -164,7 +163,7 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
         job.report(len(found) / len(windows), f"Keeping bodies apart: {len(found)} of {len(windows)} windows")
     job.folder.forget(CROWD, names.values())
     rows = [(found[number], windows[number]) for number in sorted(found)]
-    return {player: _whole([(parts[place], window) for parts, window in rows], job.order.fps)
+    return {player: join_windows([(parts[place], window) for parts, window in rows], job.order.fps)
             for place, player in enumerate(players)}  # fmt: skip
 
 
@@ -179,19 +178,6 @@ def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
     """Edit lists without the library's place, on which their motion does not depend."""
     bare = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches] for edit in edits]
     return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, bare))
-
-
-def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
-    """One player's windows as one."""
-    if not parts:
-        none = np.zeros(0)
-        return CrowdPart(correction=in_turn([], fps), frames=none.astype(int), depth=none, before=0.0,
-                         led_frames=none.astype(int), led=np.zeros((0, 3)))
-    cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
-    only = [one for one, _ in parts]
-    arrays = {name: np.concatenate([getattr(one, name) for one in only])
-              for name in ("frames", "depth", "led_frames", "led")}  # fmt: skip
-    return CrowdPart(correction=joined(cores, round(REACH * fps)), before=max(one.before for one in only), **arrays)
 
 
 def finish(
