@@ -23,9 +23,8 @@ from ..parts import Part
 from ..player_edit import PlayerEdit, write_player
 from ..state import MatchState
 from .pool import Failed, Workplace, run
-from .searched import Piece, keep_piece, kept_piece
-from .splice import spliced
 from .units import units_of
+from .windows import Piece, keep_piece, kept_piece, spliced
 from .work import Finish, LibrarySource, finish_player, part_crowd, search_unit
 
 SEARCH, CROWD = "search", "crowd"

@@ -1,9 +1,8 @@
 """A player's plan cut into windows of work, each of which any process can search by itself.
 
 Windows lie on a fixed grid of the match's clock, so that the same second falls into the same window for everybody, and
-overlap, so that neighbours can be joined where both have found the same (`splice`). They begin and end with whole slots
-of the search, counted from the stretch's first frame: in the overlap both are offered the same footage at the same
-frames.
+overlap, so that neighbours can be joined where both have found the same (`windows`). They begin and end with whole
+slots of the search, counted from the stretch's first frame: in the overlap both are offered the same source frames.
 """
 
 from __future__ import annotations

@@ -26,8 +26,8 @@ from ...synthesis.take import Take
 from ..crowd.crowd_window import CrowdPart, crowd_window
 from ..player_edit import PlayerEdit
 from ..shown import shown
-from .searched import Piece, searched
 from .units import Unit
+from .windows import Piece, searched
 
 _MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.match.pieces.searched import searched
 from beyond_mocap.match.pieces.units import cut_plan, cut_track, frame_count, units_of, window_edges
+from beyond_mocap.match.pieces.windows import searched
 from beyond_mocap.match.player_edit import kept
 from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
