@@ -131,7 +131,7 @@ def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment])
 
 
 def edited(path: str | os.PathLike) -> bool:
-    """Whether there is such a file and somebody has changed it since it was written, or wrote it himself."""
+    """Whether there is such a file, and a person has changed it since it was written, or written it."""
     if not Path(path).is_file():
         return False
     lines = read_text(path).splitlines(keepends=True)
