@@ -20,7 +20,7 @@ from beyond_mocap.match.crowd.variety import share_in_step
 from beyond_mocap.match.expand import expanded
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
-from beyond_mocap.match.take_npz import read_player
+from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
 from beyond_mocap.synthesis.quality.jerk import jerk

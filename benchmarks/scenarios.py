@@ -11,8 +11,7 @@ import numpy as np
 from benchmarks import effort, markdown
 from benchmarks.edit_time import edit_times
 from benchmarks.places import LIBRARIES, library_folder, scenario
-from beyond_mocap.evaluation.judged import judged
-from beyond_mocap.evaluation.report import evaluate
+from beyond_mocap.evaluation.report import evaluate, judge_figures
 from beyond_mocap.library.build import build
 from beyond_mocap.library.library import Library
 from beyond_mocap.synthesis.plan import Plan
@@ -56,7 +55,7 @@ def report_of(library: Library, number: int) -> dict:
 
 def figures(reports: Mapping[int, Mapping]) -> list[str]:
     """A row for each figure with a target: its value in every scenario, the recordings' own, in how many it is met."""
-    rows = {number: {row.name: row for row in judged(report)} for number, report in reports.items()}
+    rows = {number: {row.name: row for row in judge_figures(report)} for number, report in reports.items()}
     lines = markdown.head(["figure", "target", *(f"scenario {number}" for number in rows), "recordings", "met in"])
     for name in dict.fromkeys(row.name for of in rows.values() for row in of.values() if row.status):
         found = [of.get(name) for of in rows.values()]

@@ -63,8 +63,7 @@ def run_order(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`study order`: writes study.json and, if asked, the movies under neutral names; motions are to be rendered."""
     from ..files.whole import whole_folder
     from ..study.form import MOVIES
-    from ..study.order import ordered
-    from ..study.study_file import read_clips, write_study
+    from ..study.order import ordered, read_clips, write_study
 
     table = options.clips.parent
     clips = [replace(clip, file=_from(options.out, table / clip.file)) for clip in read_clips(options.clips)]
@@ -111,7 +110,7 @@ def run_form(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`study form`: a page and a table for each rater in FOLDER/forms."""
     from ..files.whole import atomic_write
     from ..study.form import clip_source, form_page, form_table
-    from ..study.study_file import read_study
+    from ..study.order import read_study
 
     study = read_study(options.study)
     found = {clip.name: clip_source(options.study / CLIPS, clip.name) for clip in study.clips}
@@ -153,8 +152,8 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.whole import atomic_write
     from ..study.analysis import analysed
     from ..study.answers import answer_files, read_answers
+    from ..study.order import read_study
     from ..study.page import p_text, study_page, study_report
-    from ..study.study_file import read_study
 
     answers = options.answers or [options.study / ANSWERS]
     check_outputs(options.report, options.html, never=(*answer_files(answers), options.study / "study.json"))

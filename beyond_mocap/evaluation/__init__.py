@@ -1,22 +1,16 @@
 """Figures of a take beside the recordings' own; the report page.
 
-- `root`       on the track: root and pelvis error, sway, surge, speeds, what the library can play
-- `feet`       on the ground: skate on contacts, slide per stance, GMD's ratio, support, the lock's corrections
-- `pieces`     read off the provenance: seams, warp rate, replayed loops
-- `jerk`       seams against uncut recordings of the same speed
-- `words`      annotation similarity (Faustino §3.2.2 eq. 18)
+- `figures`    the report's groups of figures, the words' similarity among them (Faustino §3.2.2 eq. 18)
 - `realism`    distance to the nearest recorded pose; the smoothness curve (Faustino App. D)
-- `moments`    what became of each key moment, and how near the striking surface was to the ball
-- `give_way`   what gave way, and at which seconds
-- `played`     what was played, from a take in memory or from files
-- `reference`  a library's own scores, once per library and rate
+- `reference`  a library's own scores, once per library and rate, and a take beside them
 - `per_frame`  figures of every frame, footprints, key moments in space: what overlays and curves show
-- `view`, `figures`, `report`  the Report JSON, and reports side by side as a table
-- `targets`    what each figure aims for, and `judged` whether it is met; `html` and `plots` the report as a page
+- `report`     the Report JSON, reports side by side as a table, and which targets are met
+- `html` and `plots` the report as a page; `html_page` what all reports' pages are built of
+- `paired_tests` one way of doing something against another, subject by subject
 
     report = evaluate(take, track, library)
     print(table({"path": report, "blocks": other}))
 
-Functions in the upper half take plain arrays. Speed classes are 0-1, 1-2, 2-3, 3-4.5 m/s and above; an *own score* is
-the same figure on the uncut source clips, at the output's rate, over the frames that were used.
+What is measured of a take alone is in `synthesis.quality`. Speed classes are 0-1, 1-2, 2-3, 3-4.5 m/s and above; an
+*own score* is the same figure on the uncut source clips, at the output's rate, over the frames that were used.
 """

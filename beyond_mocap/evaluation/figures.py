@@ -1,9 +1,14 @@
-"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known."""
+"""The report's groups of figures, each a dict of its own, NaN or None where nothing is known.
+
+How well the words were met is Faustino's annotation similarity (§3.2.2 eq. 18), as printed and over the asked words
+only. Words are sets per frame; sides are those after mirroring. A frame whose asked words are None (transition, or
+nothing known to be asked) is left out.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -16,20 +21,17 @@ from ..motion.track import sample, zero_phase_hann
 from ..synthesis.quality import feet, jerk, pieces, root
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
-from . import realism, words
-from .reference import source_poses
-from .view import View
+from . import realism
+from .reference import View, source_poses
 
 
 def place(view: View) -> dict:
     """Root and pelvis error, surge, speed coverage."""
     pelvis, fps = view.played.pelvis, view.fps
     own = _mean(view.own("sway"))
-    out = {
-        "root_error_m": dict.fromkeys(("mean", "p95", "max")),
-        "pelvis_error_m": {"mean": None, "own": own, "keys": None},
-        "speed_coverage": {"above": None, "below": None},
-    }
+    out = {"root_error_m": dict.fromkeys(("mean", "p95", "max")),
+           "pelvis_error_m": {"mean": None, "own": own, "keys": None},
+           "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.wanted is not None:
         error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
         out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
@@ -47,14 +49,14 @@ def _surge(view: View) -> dict:
     ours = root.surge(view.played.pelvis, view.fps)
     own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
     rms, real = _rms(ours), _rms(own)
-    asked = None
-    if view.wanted is not None:
-        asked = _rms(root.surge(zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW), view.fps))
+    smooth = None if view.wanted is None else zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW)
+    asked = None if smooth is None else _rms(root.surge(smooth, view.fps))
     surge = {"mean": rms, "own": real, "track": asked}
     return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
 
 
 def keys(view: View) -> list[dict]:
+    """One group for each key moment."""
     return [_key(view, moment) for moment in view.moments]
 
 
@@ -64,27 +66,16 @@ def _key(view: View, moment: Moment) -> dict:
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
         error = root.root_error(played.pelvis, view.wanted, view.fps)
+        frame = int(round((met_at - played.start_time) * view.fps)) if np.isfinite(met_at) else moment.frame
         place["position_error_m"] = float(np.interp(time, played.times, error))
         place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
-        place["ball_shift_m"] = ball_shift(played, _met_frame(played, moment, met_at), view.track)
+        place["ball_shift_m"] = ball_shift(played, frame, view.track)
     return {
-        "time_s": moment.asked.time,
-        "solved_time_s": moment.asked.solved,
-        "labels": list(moment.asked.words),
-        "clip": moment.clip,
-        "clip_frame": moment.clip_frame,
-        "time_error_s": moment.played_at - time,
-        **place,
-        "contact_gap_m": ball_gap(played, moment),
-        "met_s": met_at,
-        "met_gap_m": met_gap,
+        "time_s": moment.asked.time, "solved_time_s": moment.asked.solved, "labels": list(moment.asked.words),
+        "clip": moment.clip, "clip_frame": moment.clip_frame, "time_error_s": moment.played_at - time, **place,
+        "contact_gap_m": ball_gap(played, moment), "met_s": met_at, "met_gap_m": met_gap,
         "used_instead": None if moment.used_instead is None else list(moment.used_instead),
     }
-
-
-def _met_frame(played, moment: Moment, met_at: float) -> int:
-    """The output frame at which the ball is met; the key moment's where it is not."""
-    return int(round((met_at - played.start_time) * played.motion.fps)) if np.isfinite(met_at) else moment.frame
 
 
 def skate_and_ground(view: View) -> dict:
@@ -100,16 +91,13 @@ def skate_and_ground(view: View) -> dict:
         "skate": {
             "contact_cm_s": 100.0 * _mean(feet.contact_speeds(planted, played.contacts, fps)),
             "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
-            "stance_mm_median": 1000.0 * _median(travel),
-            "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
-            "gmd_ratio": _mean(skating),
-            "source_gmd_ratio": _mean(view.own("skating")),
+            "stance_mm_median": 1000.0 * _median(travel), "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
+            "gmd_ratio": _mean(skating), "source_gmd_ratio": _mean(view.own("skating")),
             "source_stance_mm_median": 1000.0 * _median(own),
             "source_stances_over_21mm": _mean(own > feet.NOTICED_SLIDE),
         },
         "ground_mm": {
-            "min": 1000.0 * float(played.positions[..., 2].min()),
-            "support_max": 1000.0 * _max(support),
+            "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _max(support),
             "source_support_max": 1000.0 * _max(view.own("support")),
             "tip_min": -1000.0 * _max(-feet.tip_height(played.motion.skeleton, played.positions, played.rotations)),
             "source_tip_min": -1000.0 * _max(-view.own("tip")),
@@ -126,10 +114,8 @@ def polish(view: View, ik_miss: np.ndarray | None) -> dict:
     missed = None if ik_miss is None else np.asarray(ik_miss).reshape(view.count, -1).max(axis=1) > 0.005
     bones = None if view.library is None else _bone_change(view)
     return {
-        "foot_correction_m": _spread(shift, ("p95",)),
-        "ik_miss_share": None if missed is None else _mean(missed),
-        "pelvis_drop_m": drop,
-        "bone_change_m": bones,
+        "foot_correction_m": _spread(shift, ("p95",)), "ik_miss_share": None if missed is None else _mean(missed),
+        "pelvis_drop_m": drop, "bone_change_m": bones,
     }
 
 
@@ -165,18 +151,14 @@ def seams_and_loops(view: View) -> dict:
         at_seams = jerk.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         rest = jerk.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
-            **_spread(at_seams, ("median", "p95", "max")),
-            "share_above_real": _mean(at_seams > 1.0),
-            "source_share_above_real": _mean(view.own("jerk_above_real")),
-            "rest_max": _max(rest),
+            **_spread(at_seams, ("median", "p95", "max")), "share_above_real": _mean(at_seams > 1.0),
+            "source_share_above_real": _mean(view.own("jerk_above_real")), "rest_max": _max(rest),
             "rest_share_above_real": _mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
     rates = pieces.warp_rates(*view.source)
     return {
-        **out,
-        "seams": len(view.seams) if known else None,
-        "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
+        **out, "seams": len(view.seams) if known else None, "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
         "loop_share": _mean(pieces.replayed(*view.source, view.fps)) if known else None,
     }
 
@@ -200,7 +182,7 @@ def asked_words(
 ) -> list[frozenset[str] | None]:
     """Words asked for at each of `times` (T,) s; None where nothing counts: transitions, the entry and exit of each key
     moment's clip (Faustino §3.2.2), and automatic locomotion that was not filled in."""
-    out = [found if found else None for found in words_per_frame(timeline, times)]
+    out = [found or None for found in words_per_frame(timeline, times)]
     for moment in moments:
         out[moment.entry : moment.exit + 1] = [None] * (moment.exit + 1 - moment.entry)
     return out
@@ -232,35 +214,65 @@ def annotation_similarity(view: View) -> dict:
     want, have = [m.asked.words for m in view.moments], [m.words for m in view.moments]
     offered = [] if view.library is None else view.library.keys
     had = [m for m in view.moments if serving(offered, m.asked.words)]
-
-    def mean(want, have, measure):
-        return words.mean_similarity(words.similarity(want, have, measure))
-
-    return {
-        "all": mean(asked, played.words, words.asked_similarity),
-        "keys": mean(want, have, words.asked_similarity),
-        "had_keys": mean([m.asked.words for m in had], [m.words for m in had], words.asked_similarity),
-        "eq18_all": mean(asked, played.words, words.eq18),
-        "eq18_keys": mean(want, have, words.eq18),
+    return {  # means of the frames that count (Faustino Table 2 averages so)
+        "all": _mean(similarity(asked, played.words)), "keys": _mean(similarity(want, have)),
+        "had_keys": _mean(similarity([m.asked.words for m in had], [m.words for m in had])),
+        "eq18_all": _mean(similarity(asked, played.words, eq18)), "eq18_keys": _mean(similarity(want, have, eq18)),
     }
 
 
 def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> list[str]:
     """What gave way, and when."""
-    lines = give_way(
-        view.played, track=view.track, timeline=view.timeline, library=view.library, ik_miss=ik_miss, asked=asked
-    )
+    lines: list[str] = [*give_way(view.played, track=view.track, timeline=view.timeline, library=view.library,
+                                  ik_miss=ik_miss, asked=asked)]
     if view.reference is None:
-        return [*lines]
+        return lines
     hard = jerk.jerk(view.played.positions, view.fps)
     ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
     told = jolts(view.played.times, view.seams, ratios)
-    return [*lines, told] if told else [*lines]
+    return [*lines, told] if told else lines
+
+
+def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
+    """Faustino eq. 18 for one frame as printed: -1 all words alike .. 1 none, NaN where neither has a word.
+
+    With 1 for a present and -1 for an absent word, the products over words that either frame has, negated, over their
+    number r: one word in common counts -1, one that only one of them has counts +1.
+    """
+    asked, played = set(asked), set(played)
+    either = asked | played
+    return (len(asked ^ played) - len(asked & played)) / len(either) if either else np.nan
+
+
+def asked_similarity(asked: Iterable[str], played: Iterable[str]) -> float:
+    """Eq. 18 over the asked words only: -1 all are played .. 1 none is; words beyond those count neither way."""
+    asked = set(asked)
+    return 1.0 - 2.0 * len(asked & set(played)) / len(asked) if asked else np.nan
+
+
+def similarity(
+    asked: Sequence[Iterable[str] | None], played: Sequence[Iterable[str]], measure=asked_similarity
+) -> np.ndarray:
+    """`measure` at every frame: (T,), NaN where nothing was asked. Takes repeat words, so each pair is scored once."""
+    known: dict[tuple, float] = {}
+    out = np.full(len(played), np.nan)
+    for frame, (want, have) in enumerate(zip(asked, played)):
+        if want is None:
+            continue
+        pair = (tuple(want), tuple(have))
+        if pair not in known:
+            known[pair] = measure(*pair)
+        out[frame] = known[pair]
+    return out
+
+
+def _known(values: np.ndarray) -> np.ndarray:
+    values = np.asarray(values, dtype=float)
+    return values[np.isfinite(values)]
 
 
 def _mean(values: np.ndarray) -> float:
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
+    known = _known(values)
     return float(known.mean()) if len(known) else math.nan
 
 
@@ -269,8 +281,7 @@ def _median(values: np.ndarray) -> float:
 
 
 def _max(values: np.ndarray) -> float:
-    known = np.asarray(values, dtype=float)
-    known = known[np.isfinite(known)]
+    known = _known(values)
     return float(known.max()) if len(known) else math.nan
 
 

@@ -31,18 +31,15 @@ from .html_page import (
     element,
     fragment,
 )
-from .judged import judged
-from .view import View
+from .reference import View
+from .report import judge_figures
 
 MOST_MOMENTS = 12
 """Strips of key moments on the page; the table tells all of them."""
 
 _STRIP_SECONDS = (-0.5, -0.3, -0.2, -0.1, -1e-9, 0.1, 0.2, 0.3, 0.5)
-_KEY_TEXTS = {
-    "time_error_s": "time error {:.3f} s",
-    "contact_gap_m": "gap to the ball {:.3f} m",
-    "ball_shift_m": "ball moved {:.3f} m",
-}
+_KEY_TEXTS = {"time_error_s": "time error {:.3f} s", "contact_gap_m": "gap to the ball {:.3f} m",
+              "ball_shift_m": "ball moved {:.3f} m"}  # fmt: skip
 _STYLE = """
 .keys td { max-width: 16em; overflow-wrap: break-word }
 .chips span { display: inline-block; margin: 0 1em .2em 0; overflow-wrap: anywhere }
@@ -51,14 +48,9 @@ _STYLE = """
 
 
 def html_report(
-    played: Played,
-    report: Mapping,
-    *,
-    track: Track | None = None,
-    timeline: Timeline | None = None,
-    library: Library | None = None,
-    title: str = "Take",
-) -> str:
+    played: Played, report: Mapping, *, track: Track | None = None, timeline: Timeline | None = None,
+    library: Library | None = None, title: str = "Take",
+) -> str:  # fmt: skip
     """The page as text. played, track, timeline and library: what `report` (of `evaluate_played`) was made from.
 
     Raises InputError where matplotlib is not installed, or the library has another skeleton than the motion.
@@ -73,7 +65,7 @@ def html_report(
 
 
 def _head(view: View, report: Mapping, title: str) -> Html:
-    statuses = [row.status for row in judged(report) if row.status]
+    statuses = [row.status for row in judge_figures(report) if row.status]
     method = f"method {report['method']}, " if report.get("method") else ""
     told = f"{view.count} frames at {view.fps:g} per second, {view.played.motion.duration:.1f} s, {method}"
     met = f"{statuses.count('met')} of {len(statuses)} targets met"
@@ -119,7 +111,9 @@ def _moments(view: View, report: Mapping) -> Html:
 
 
 def _strip(view: View, frame: int, name: str) -> Html:
-    return build_image(plots.strip(view, _around(view, frame), frame), f"stick figures at {name}")
+    frames = np.rint(frame + np.array(_STRIP_SECONDS) * view.fps).astype(int)
+    around = np.unique(np.clip(frames, 0, view.count - 1)).tolist()
+    return build_image(plots.strip(view, around, frame), f"stick figures at {name}")
 
 
 def _told(key: Mapping) -> str:
@@ -157,18 +151,13 @@ def worst_frames(view: View) -> list[tuple[int, str]]:
     return found
 
 
-def _around(view: View, frame: int) -> list[int]:
-    frames = np.rint(frame + np.array(_STRIP_SECONDS) * view.fps).astype(int)
-    return np.unique(np.clip(frames, 0, view.count - 1)).tolist()
-
-
 def _figures(report: Mapping) -> Html:
     head = ("figure", build_title("value"), build_title("recordings"), "target", "")
     rows = [
         build_row(
             row.name, element("td", row.value, class_="n"), element("td", row.own, class_="n"), row.target,
             element("td", row.status, class_=row.status or "quiet"),
-        ) for row in judged(report) if not row.name.startswith("keys ")
+        ) for row in judge_figures(report) if not row.name.startswith("keys ")
     ]  # fmt: skip
     return build_section("All figures", build_table(head, rows), _key_table(report))
 
@@ -177,7 +166,7 @@ def _key_table(report: Mapping) -> Html:
     """One line per key moment, one column per figure; the targets stand in the head."""
     if not report["keys"]:
         return Html()
-    rows = {row.name: row for row in judged(report)}
+    rows = {row.name: row for row in judge_figures(report)}
     numbers = range(1, len(report["keys"]) + 1)
     known = {leaf: [rows[name] for k in numbers if (name := f"keys {k}.{leaf}") in rows] for leaf in report["keys"][0]}
     columns = {leaf: found[0].target for leaf, found in known.items() if found}

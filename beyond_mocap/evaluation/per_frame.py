@@ -1,7 +1,6 @@
 """The figures of a take frame by frame, and its footprints: what overlays and curves show of it.
 
-Nothing is measured here that the report does not measure: `root`, `feet` and `jerk` say how
-(`../shared/metrics.md`).
+Nothing is measured here that the report does not measure: `root`, `feet` and `jerk` say how (`../shared/metrics.md`).
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from ..annotation.ball_contact import surfaces
 from ..annotation.striking import faster_middle, nearest_on
 from ..synthesis.quality import feet, jerk, root
 from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
-from .view import View
+from .reference import View
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,16 +85,11 @@ def per_frame(view: View) -> PerFrame:
         values = jerk.jerk(played.positions, view.fps)
         hard[jerk.SEAM_TO_JERK :][: len(values)] = jerk.ratios(values, view.speed, view.reference.jerk_p95)
     return PerFrame(
-        times=played.times,
-        track=wanted,
+        times=played.times, track=wanted, slide=slides, correction=corrected, jerk=hard, speed=view.speed,
         root_error=root.root_error(played.pelvis, wanted, view.fps) if known else unknown,
         pelvis_error=root.pelvis_error(played.pelvis, wanted) if known else unknown,
-        slide=slides,
-        correction=corrected,
-        jerk=hard,
-        speed=view.speed,
         asked_speed=root.travel_speed(wanted, view.fps) if known else unknown,
-    )
+    )  # fmt: skip
 
 
 def footprints(view: View) -> tuple[Footprint, ...]:

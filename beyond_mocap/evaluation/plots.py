@@ -18,7 +18,7 @@ from ..motion.quaternion import about_up, rotate
 from ..motion.track import BALL_RADIUS
 from ..synthesis.quality import pieces, root
 from . import figures, realism
-from .view import View
+from .reference import View
 
 WIDTH = 11.0
 DPI = 100
@@ -41,13 +41,12 @@ def require_matplotlib() -> None:
 
 def curves(view: View) -> bytes:
     """Root error, feet, speed and steadiness over time, one above the other."""
-    panels = [_draw_root, _draw_feet, _draw_speed, _draw_smoothness]
-    canvas, axes = _canvas(len(panels), [2.0, 2.0, 2.0, 1.6])
-    for draw, ax in zip(panels, axes):
+    canvas, axes = _canvas(2.0, 2.0, 2.0, 1.6)
+    for draw, ax in zip((_draw_root, _draw_feet, _draw_speed, _draw_smoothness), axes):
         draw(ax, view)
         _mark_moments(ax, view)
     _time_axis(axes[-1], view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def legend(view: View) -> dict[int, tuple[int, str]]:
@@ -64,24 +63,22 @@ def legend(view: View) -> dict[int, tuple[int, str]]:
 
 def clips(view: View) -> bytes:
     """Which clip is played when, by the numbers of `legend`, with its seams, and how fast it is played."""
-    canvas, (bar, warp) = _canvas(2, [0.8, 1.4])
+    canvas, (bar, warp) = _canvas(0.8, 1.4)
     names = legend(view)
     edges = [0, *view.seams, view.count]
     for low, high in zip(edges[:-1], edges[1:]):
         _clip_bar(bar, view, low, high, names)
     bar.set_yticks([])
-    bar.set_ylabel("clip")
-    bar.set_title("clips and seams; ' marks a mirrored clip", loc="left", fontsize=9.5)
+    _title(bar, "clips and seams; ' marks a mirrored clip", "clip")
     rate = np.append(pieces.played_rate(*view.source), np.nan)
     rate[view.seams - 1] = np.nan
     warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
     for limit in (0.85, 1.15):
         warp.axhline(limit, color="#999999", lw=0.8, ls="--")
-    warp.set_ylabel("played / recorded")
-    warp.set_title("time warp", loc="left", fontsize=9.5)
+    _title(warp, "time warp", "played / recorded")
     _mark_moments(warp, view)
     _time_axis(warp, view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def words(view: View) -> bytes | None:
@@ -98,7 +95,7 @@ def words(view: View) -> bytes | None:
     rows = rows[:_MOST_ROWS]
     if not rows:
         return None
-    canvas, (ax,) = _canvas(1, [0.5 + 0.24 * len(rows)])
+    canvas, (ax,) = _canvas(0.5 + 0.24 * len(rows))
     for row, word in enumerate(rows):
         _bars(ax, view, np.array([word in (w or ()) for w in asked]), row - 0.38, "#8fb8de")
         _bars(ax, view, np.array([word in w for w in got]), row + 0.02, "#3c7d4e")
@@ -106,10 +103,10 @@ def words(view: View) -> bytes | None:
         ax.plot(times, [row - 0.2] * len(times), "v", color=RIGHT, ms=6)
     ax.set_yticks(range(len(rows)), rows)
     ax.set_ylim(len(rows) - 0.5, -0.5)
-    ax.set_title("words: asked (blue; red: key moments) above got (green)", loc="left", fontsize=9.5)
+    _title(ax, "words: asked (blue; red: key moments) above got (green)")
     ax.grid(axis="y", visible=False)
     _time_axis(ax, view)
-    return _png(canvas)
+    return render_png(canvas)
 
 
 def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes:
@@ -123,7 +120,7 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     turn = about_up(np.array(-facing + np.radians(20.0)))
     top = max(1.6, float(view.played.positions[list(frames), :, 2].max()) + 0.15)
     span = len(frames) * _SPACING
-    canvas, (ax,) = _canvas(1, [(top + 0.35) * WIDTH / span])
+    canvas, (ax,) = _canvas((top + 0.35) * WIDTH / span)
     for number, frame in enumerate(frames):
         _figure(ax, view, frame, turn, number * _SPACING)
         weight = "bold" if frame == marked else "normal"
@@ -134,21 +131,49 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     ax.set_ylim(-0.35, top)
     ax.set_aspect("equal")
     ax.axis("off")
-    return _png(canvas)
+    return render_png(canvas)
+
+
+def create_canvas(height: float, rows: int = 1, columns: int = 1, **layout):
+    """A figure without a window, so many inches high, and its axes row by row. layout: as `Figure.subplots` has it."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False, **layout).ravel()
+    plain(axes)
+    return figure, axes
+
+
+def plain(axes) -> None:
+    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
+    for ax in axes:
+        ax.grid(color="#e6e6e6", lw=0.6)
+        ax.set_axisbelow(True)
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.tick_params(labelsize=8)
+        ax.yaxis.label.set_fontsize(8)
+
+
+def render_png(figure) -> bytes:
+    """The figure as a PNG, which says nothing of the program that drew it."""
+    out = io.BytesIO()
+    figure.savefig(out, format="png", metadata={"Software": None})
+    return out.getvalue()
 
 
 def _draw_root(ax, view: View) -> None:
-    ax.set_title("distance from the track", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "distance from the track", "cm")
     if view.wanted is None:
-        return _empty(ax, "no track was given")
+        ax.text(0.5, 0.5, "no track was given", ha="center", va="center", transform=ax.transAxes, fontsize=9,
+                color="#777777")
+        return
     times, pelvis = view.played.times, view.played.pelvis
     error, smooth = root.pelvis_error(pelvis, view.wanted), root.root_error(pelvis, view.wanted, view.fps)
     ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis, as it sways")
     ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
     ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
     ax.set_ylim(bottom=0.0)
-    return _legend(ax, 3)
+    _legend(ax, 3)
 
 
 def _draw_feet(ax, view: View) -> None:
@@ -158,8 +183,7 @@ def _draw_feet(ax, view: View) -> None:
         stands = view.played.contacts[:, side]
         _bars(ax, view, stands, bottom=-5.0 - 4.0 * side, colour=colour, height=3.0)
     ax.set_ylim(bottom=-11.0)
-    ax.set_title("toe heights; bars: foot in contact", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "toe heights; bars: foot in contact", "cm")
     _legend(ax, 2)
 
 
@@ -171,8 +195,7 @@ def _draw_speed(ax, view: View) -> None:
     if view.reference is not None and np.isfinite(view.reference.fastest):
         ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
     ax.set_ylim(bottom=0.0)
-    ax.set_title("speed", loc="left", fontsize=9.5)
-    ax.set_ylabel("m/s")
+    _title(ax, "speed", "m/s")
     _legend(ax, 3)
 
 
@@ -188,8 +211,7 @@ def _draw_smoothness(ax, view: View) -> None:
         label = "seam" if number == 0 else None
         ax.axvline(played.times[seam], color=BALL, lw=0.8, alpha=0.7, zorder=0, label=label)
     ax.set_ylim(bottom=0.0)
-    ax.set_title("smoothness: distance of features (Faustino App. D)", loc="left", fontsize=9.5)
-    ax.set_ylabel("cm")
+    _title(ax, "smoothness: distance of features (Faustino App. D)", "cm")
     _legend(ax, 3)
 
 
@@ -222,9 +244,10 @@ def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None
         if parent > 0 or (parent == 0 and view.played.body.hips == 0):
             colour = _SIDES.get(side_and_part(skeleton.names[joint])[0], MIDDLE)
             ax.plot(offset + seen[[parent, joint], 0], seen[[parent, joint], 2], color=colour, lw=1.6, zorder=2)
-    ball = _ball(view, frame)
-    if ball is not None:
-        centre = rotate(turn, ball - origin)
+    ball = view.played.ball
+    centre = None if ball is None else ball.positions[np.argmin(np.abs(ball.times - view.played.times[frame]))]
+    if centre is not None and np.isfinite(centre).all():
+        centre = rotate(turn, centre - origin)
         if abs(centre[0]) < 0.55 * _SPACING and abs(centre[1]) < 1.5 and centre[2] < 2.5:
             from matplotlib.patches import Circle
 
@@ -232,32 +255,10 @@ def _figure(ax, view: View, frame: int, turn: np.ndarray, offset: float) -> None
             ax.add_patch(Circle(place, BALL_RADIUS, facecolor=BALL, edgecolor="black", lw=0.6, zorder=3))
 
 
-def _ball(view: View, frame: int) -> np.ndarray | None:
-    ball = view.played.ball
-    if ball is None:
-        return None
-    place = ball.positions[int(np.argmin(np.abs(ball.times - view.played.times[frame])))]
-    return place if np.isfinite(place).all() else None
-
-
-def _canvas(rows: int, heights: Sequence[float]):
-    """A figure without a window, and its axes from above."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH, sum(heights) + 0.1 * rows), dpi=DPI, layout="constrained")
-    axes = figure.subplots(rows, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})[:, 0]
-    plain(axes)
-    return figure, axes
-
-
-def plain(axes) -> None:
-    """The look of all pictures: a faint grid behind, no frame above and on the right, small figures."""
-    for ax in axes:
-        ax.grid(color="#e6e6e6", lw=0.6)
-        ax.set_axisbelow(True)
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.tick_params(labelsize=8)
-        ax.yaxis.label.set_fontsize(8)
+def _canvas(*heights: float):
+    """A figure of panels so many inches high above one another, and their axes."""
+    rows = len(heights)
+    return create_canvas(sum(heights) + 0.1 * rows, rows, sharex=True, gridspec_kw={"height_ratios": heights})
 
 
 def _time_axis(ax, view: View) -> None:
@@ -270,11 +271,6 @@ def _legend(ax, columns: int) -> None:
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, fontsize=8, frameon=False, borderpad=0.1)
 
 
-def _empty(ax, text: str) -> None:
-    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes, fontsize=9, color="#777777")
-
-
-def _png(figure) -> bytes:
-    out = io.BytesIO()
-    figure.savefig(out, format="png", metadata={"Software": None})
-    return out.getvalue()
+def _title(ax, title: str, unit: str = "") -> None:
+    ax.set_title(title, loc="left", fontsize=9.5)
+    ax.set_ylabel(unit)

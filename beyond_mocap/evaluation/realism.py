@@ -13,7 +13,8 @@ from ..library.features import feature_joints, raw_features
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions
 from ..motion.skeleton import Skeleton
-from ..synthesis.quality.root import nearest_known, speed_class
+from ..synthesis.quality import jerk
+from ..synthesis.quality.root import speed_class
 
 VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
 _ROWS_AT_ONCE = 512  # of distances, which bounds the memory
@@ -74,14 +75,12 @@ def nearest_distance(
     return np.sqrt(np.maximum(out, 0.0))
 
 
-def real_p95(distance: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
-    """95th percentile (5,) m of leave-one-clip-out distances (M,) in each speed class of speed (M,) m/s.
-
-    Classes with fewer than `least` poses take the nearest class that has them; NaN where a library has one clip only.
-    """
-    classes = speed_class(speed)
-    values = [distance[(classes == k) & np.isfinite(distance)] for k in range(5)]
-    return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+def real_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """95th percentile (5,) m, by `jerk.real_p95`, in each speed class of speed (M,) m/s: of leave-one-clip-out
+    distances (M,), infinite where a library has one clip only, or of uncut recordings' smoothness (M,), NaN between
+    clips."""
+    known = np.isfinite(values)
+    return jerk.real_p95(values[known], speed[known])
 
 
 def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
@@ -102,11 +101,3 @@ def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndar
     joints = feature_joints(skeleton)
     facing = np.unwrap(heading_from_positions(skeleton, positions))
     return np.linalg.norm(np.diff(raw_features(positions[:, joints], facing, fps), axis=0), axis=-1)
-
-
-def smoothness_p95(curve: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
-    """95th percentile (5,) m of uncut recordings' smoothness (N,), NaN between clips, in each speed class of speed (N,)
-    m/s; a class with fewer than `least` frames takes the nearest class that has them."""
-    classes, known = speed_class(speed), np.isfinite(curve)
-    values = [curve[known & (classes == k)] for k in range(5)]
-    return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))

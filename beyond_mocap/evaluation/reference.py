@@ -1,6 +1,7 @@
-"""What a library's uncut recordings score themselves, worked out once per library and output rate.
+"""What a library's uncut recordings score themselves, worked out once per library and output rate, and a take beside
+them (`View`).
 
-Measured are the recordings as they are used: brought to the library's skeleton and mended (`library.repair`), which
+Measured are the recordings as they are used: brought to the library's skeleton and repaired (`library.repair`), which
 leaves their jerk as it was: the 95th percentile moves by 1 % at most where clips keep their speed class, by 4 to 9 % on
 a library of five bodies whose clips nearly all get other feet.
 
@@ -15,13 +16,18 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ..annotation import Timeline
 from ..annotation.gaits import STANDING
 from ..base.errors import InputError
 from ..library.clip import Clip
 from ..library.library import Library
-from ..motion.humanoid import Humanoid, identify
+from ..motion.humanoid import Humanoid, identify, stature
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
-from ..synthesis.quality import feet, jerk, root
+from ..motion.skeleton import Skeleton
+from ..motion.track import Track
+from ..synthesis.quality import feet, jerk, pieces, root
+from ..synthesis.quality.moments import moments
+from ..synthesis.quality.played import Played
 from . import realism
 
 POSES_PER_SECOND = 10.0
@@ -128,31 +134,19 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     hard, speed = (np.concatenate(column) for column in zip(*windows))
     jerk_p95 = jerk.real_p95(hard, speed)
     poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
-    joined = {name: _joined(measured, name) for name in _PER_FRAME}
+    joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED}
     return LibraryReference(
-        fps=fps,
-        index={recording.path: i for i, recording in enumerate(measured)},
-        first=first,
+        fps=fps, index={recording.path: i for i, recording in enumerate(measured)}, first=first,
         rate=np.array([recording.rate for recording in measured]),
         jerk_above_real=np.concatenate([_above(recording, jerk_p95) for recording in measured]),
         stances=np.concatenate([r.stances + [start, start, 0] for r, start in zip(measured, first)]),
-        travel=_joined(measured, "travel"),
-        heel_rest=float(np.median([recording.heel_rest for recording in measured])),
-        jerk_p95=jerk_p95,
-        smoothness_p95=realism.smoothness_p95(joined["smoothness"], joined["speed"]),
-        poses=poses,
-        pose_p95=pose_p95,
-        fastest=float(joined["speed"].max()),
-        slowest=_slowest_gait(library),
-        **joined,
-    )
+        heel_rest=float(np.median([recording.heel_rest for recording in measured])), jerk_p95=jerk_p95,
+        smoothness_p95=realism.real_p95(joined["smoothness"], joined["speed"]), poses=poses, pose_p95=pose_p95,
+        fastest=float(joined["speed"].max()), slowest=_slowest_gait(library), **joined,
+    )  # fmt: skip
 
 
-_PER_FRAME = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness")
-
-
-def _joined(measured: list[Recording], name: str) -> np.ndarray:
-    return np.concatenate([getattr(recording, name) for recording in measured])
+_JOINED = ("sway", "surge", "speed", "contact_speed", "skating", "support", "tip", "smoothness", "travel")
 
 
 def _originals(clips: tuple[Clip, ...]) -> tuple[list[Clip], np.ndarray]:
@@ -176,22 +170,14 @@ def measure(clip: Clip, fps: float) -> Recording:
     spans = feet.stances(contacts)
     heel_rest, floor = feet.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
     return Recording(
-        path=clip.path,
-        rate=clip.motion.fps,
-        features=realism.pose_features(skeleton, positions, fps, hips),
-        sway=root.sway(pelvis, fps),
-        surge=root.surge(pelvis, fps),
-        speed=root.travel_speed(pelvis, fps),
+        path=clip.path, rate=clip.motion.fps, features=realism.pose_features(skeleton, positions, fps, hips),
+        sway=root.sway(pelvis, fps), surge=root.surge(pelvis, fps), speed=root.travel_speed(pelvis, fps),
         contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False),
-        heel_rest=heel_rest,
-        support=feet.support_height(planted, contacts, heel_rest),
-        tip=feet.tip_height(skeleton, positions, rotations),
-        jerk=jerk.jerk(positions, fps),
-        smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
-        stances=spans,
-        travel=feet.stance_travel(planted[:, :, 1], spans),
-    )
+        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False), heel_rest=heel_rest,
+        support=feet.support_height(planted, contacts, heel_rest), tip=feet.tip_height(skeleton, positions, rotations),
+        jerk=jerk.jerk(positions, fps), smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
+        stances=spans, travel=feet.stance_travel(planted[:, :, 1], spans),
+    )  # fmt: skip
 
 
 def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
@@ -243,3 +229,46 @@ def _slowest_gait(library: Library) -> float:
         return min(gait.speed for gait in library.gaits if gait.word != STANDING)
     except InputError:
         return np.nan
+
+
+class View:
+    """What all figures of one report share, worked out once: the take, the frames of the library it used, its seams,
+    its speed, what was asked."""
+
+    def __init__(self, played: Played, track: Track | None, timeline: Timeline | None, library: Library | None):
+        motion = played.motion
+        self.played, self.timeline, self.library, self.track = played, timeline, library, track
+        self.fps, self.count = motion.fps, len(motion)
+        self.reference = None if library is None else library_reference(library, motion.fps)
+        self.size = 1.0 if library is None else _size(motion.skeleton, library.skeleton)
+        self.stride = played.stride(library)
+        self.rows = self._rows()
+        self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
+        self.seams = pieces.seams(*self.source)
+        self.speed = root.travel_speed(played.pelvis, self.fps)
+        self.wanted = None if track is None else root.track_at(track, played.times)
+        self.moments = [] if timeline is None else moments(played, timeline.keys, self.stride, library)
+
+    @property
+    def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Clip, mirrored, clip_frame and stride per frame, as `pieces` wants them."""
+        return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
+
+    def own(self, name: str) -> np.ndarray:
+        """A figure of the uncut recordings at the frames that were used: (U, ...), empty without library."""
+        return np.zeros(0) if self.reference is None else getattr(self.reference, name)[self.used]
+
+    def _rows(self) -> np.ndarray:
+        if self.reference is None:
+            return np.full(self.count, np.nan)
+        return self.reference.rows(self.played.clips, self.played.clip, self.played.clip_frame)
+
+
+def _size(skeleton: Skeleton, library: Skeleton) -> float:
+    """How many times as tall as the library's skeleton another one is; InputError where it is not the same one."""
+    if skeleton.same_bones(library, 5e-3):
+        return 1.0
+    size = stature(skeleton) / stature(library) if skeleton.names == library.names else 1.0
+    if not skeleton.same_bones(library.scaled(size), 5e-3):
+        raise InputError("motion", "another skeleton than the library's", "a motion made from this library")
+    return size

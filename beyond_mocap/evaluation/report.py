@@ -1,10 +1,11 @@
-"""The report: every figure of `../shared/metrics.md` for one player's take, in the form of `../shared/contract.md`."""
+"""The report: every figure of `../shared/metrics.md` for one player's take, in the form of `../shared/contract.md`;
+several side by side, and one as text beside its targets."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,9 +15,10 @@ from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality.moments import dribble_touches
 from ..synthesis.quality.played import Played, played_from_take
+from ..synthesis.quality.targets import target_of
 from ..synthesis.take import Take
 from . import figures
-from .view import View
+from .reference import View
 
 VERSION = 1
 DEEPEST = 30
@@ -38,10 +40,8 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     seconds = {name: take.seconds.get(name) for name in (*SECONDS, *(s for s in take.seconds if s not in SECONDS))}
     warnings = list(dict.fromkeys((*take.warnings, *report["warnings"])))
     pins = [{"time_s": p.pin.time, "part": p.pin.part, "miss": p.miss} for p in take.pins]
-    out = {
-        **report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
-        "warning_seconds": _seconds_of(warnings),
-    }
+    out = {**report, "seed": take.seed, "seconds": rounded(seconds), "method": take.method, "warnings": warnings,
+           "warning_seconds": _seconds_of(warnings)}
     if pins:
         out["pins"] = rounded(pins)
     if take.solved is not None:
@@ -50,14 +50,9 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
 
 
 def evaluate_played(
-    played: Played,
-    *,
-    track: Track | None = None,
-    timeline: Timeline | None = None,
-    library: Library | None = None,
-    ik_miss: np.ndarray | None = None,
-    asked: Timeline | None = None,
-) -> dict:
+    played: Played, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
+    ik_miss: np.ndarray | None = None, asked: Timeline | None = None,
+) -> dict:  # fmt: skip
     """The report of anything played, from memory or files (`played_from_take`, `played_from_tables`).
 
     ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the
@@ -66,18 +61,10 @@ def evaluate_played(
     """
     view = View(played, track, timeline, library)
     report = {
-        "version": VERSION,
-        "seed": None,
-        "fps": played.motion.fps,
-        "frames": len(played.motion),
-        "duration_s": played.motion.duration,
-        "seconds": dict.fromkeys(SECONDS),
-        **figures.place(view),
-        "keys": figures.keys(view),
-        **figures.skate_and_ground(view),
-        **figures.polish(view, ik_miss),
-        **figures.seams_and_loops(view),
-        **figures.poses(view),
+        "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
+        "duration_s": played.motion.duration, "seconds": dict.fromkeys(SECONDS), **figures.place(view),
+        "keys": figures.keys(view), **figures.skate_and_ground(view), **figures.polish(view, ik_miss),
+        **figures.seams_and_loops(view), **figures.poses(view),
         "annotation_similarity": figures.annotation_similarity(view),
         "warnings": figures.warnings(view, ik_miss, asked),
     }
@@ -89,19 +76,18 @@ def _seconds_of(lines: list[str]) -> list[list[list[float]]]:
     return [[[round(edge, 3) for edge in span] for span in spans_of(line)] for line in lines]
 
 
-def rounded(value, digits: int = 5):
-    """The same report with floats at `digits` significant digits, NaN and infinity as None, numpy numbers as
-    Python's."""
+def rounded(value):
+    """The same report with floats at five significant digits, NaN and infinity as None, numpy numbers as Python's."""
     if isinstance(value, Mapping):
-        return {key: rounded(entry, digits) for key, entry in value.items()}
+        return {key: rounded(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [rounded(entry, digits) for entry in value]
+        return [rounded(entry) for entry in value]
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     if isinstance(value, (int, np.integer)):
         return int(value)
     if isinstance(value, (float, np.floating)):
-        return float(f"{round(float(value), 9) + 0.0:.{digits}g}") if math.isfinite(value) else None
+        return float(f"{round(float(value), 9) + 0.0:.5g}") if math.isfinite(value) else None
     return value
 
 
@@ -151,8 +137,38 @@ def _flat(value, name: str) -> dict[str, Any]:
 
 def cell(value) -> str:
     """One figure as text for a Markdown table."""
+    return _shown(value, "-").replace("|", "\\|")
+
+
+class Row(NamedTuple):
+    """One figure as text: `own` is the recordings' score, status "met", "missed" or ""."""
+
+    name: str
+    value: str
+    own: str
+    target: str
+    status: str
+
+
+def judge_figures(report: Mapping) -> Iterator[Row]:
+    """Every figure of a report (`evaluate`) that is known or has a target."""
+    table = flat(report)
+    fps = float(report.get("fps") or 30.0)
+    for name, value in table.items():
+        group, _, leaf = name.rpartition(".")
+        target = target_of(name, fps)
+        if leaf.startswith("source_") or leaf == "own" or (value is None and target is None):
+            continue
+        own = table.get(f"{group}.source_{leaf}", table.get(f"{group}.own") if leaf == "mean" else None)
+        met = target.met(value, table) if target and isinstance(value, (int, float)) else None
+        status = "" if met is None else ("met" if met else "missed")
+        aim = target.text(table) if target else ""
+        yield Row(name, _shown(value), _shown(own, ""), aim, status)
+
+
+def _shown(value, unknown: str = "–") -> str:
     if value is None:
-        return "-"
+        return unknown
     if isinstance(value, list):
-        return " ".join(str(entry) for entry in value) or "-"
-    return f"{value:.4g}" if isinstance(value, float) else str(value).replace("|", "\\|")
+        return " ".join(map(str, value)) or unknown
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

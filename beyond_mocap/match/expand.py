@@ -1,23 +1,25 @@
-"""The motion of any span of a player, out of his edit list.
+"""The motion of any span of a player, out of their edit list; takes of a player joined, and cut.
 
-He is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the next at
-their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same; only the
-signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are in
-memory beside what comes out.
+A player is laid out in windows of a fixed grid, each with some seconds around it, and one window hands over to the
+next at their edge. So a frame is made in the same way whatever span is asked for, and comes out bit for bit the same;
+only the signs of quaternions, which are continuous within a motion, may be the other ones. No more than two windows are
+in memory beside what comes out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..base.errors import InputError
+from ..annotation import Span, Timeline
+from ..base.errors import InputError, spans_of
 from ..library.chosen import with_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
+from ..motion.motion import concatenate
 from ..motion.track.ball_path import BallPath
 from ..synthesis.construct.ball.meeting import eased
 from ..synthesis.construct.hand_over import handed_over
@@ -26,12 +28,9 @@ from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList, at_times
 from ..synthesis.search.footage import shown
 from ..synthesis.synthesize import constructed
-from ..synthesis.take import Take
-from .joined_takes import one_take, own_part
-from .pieces.cut_plan import cut_plan
-from .pieces.library_clips import bound
-from .pieces.named_edit import part
-from .pieces.units import frame_count, layout_edges
+from ..synthesis.take import DribbleTouch, Take
+from .pieces.named_edit import bound, part
+from .pieces.units import cut_plan, frame_count, window_edges
 from .player_edit import PlayerEdit, Stretch
 
 AROUND = 4.0
@@ -47,6 +46,8 @@ _PINNED = 1e-9
 """Share of a frame's own place that is as good as nothing, and holds it there."""
 
 Progress = Callable[[float, str], None]
+
+_SAME_TIME = 1e-6
 
 
 def expanded(
@@ -94,7 +95,7 @@ class _Layout:
         self.library = with_chosen_gaits(library.extended if made else library, dict(self.plan.gaits))
         self.fps, self.begin = self.plan.fps, float(self.plan.track.times[0])
         self.count = frame_count(self.plan, self.fps)
-        self.edges = layout_edges(self.begin, self.count, self.fps, window)
+        self.edges = window_edges(self.begin, self.count, window, self.fps, step=1)
 
     def take(self, start: float, end: float, tell: Callable[[float], None]) -> Take | None:
         """Frames from `start` to `end` s; None where there are fewer than two."""
@@ -183,3 +184,104 @@ def _ball_handed(
     both = np.isfinite(before) & np.isfinite(here)
     places[first : first + len(share)] = np.where(both, here + share[:, None] * (before - here), here)
     return replace(new, positions=places)
+
+
+def own_part(take: Take, first: int, end: int) -> Take:
+    """Frames first .. end of a take, with the key moments, pins, touches and warnings of that time. It has no edit
+    list, and nothing that would be needed to edit it."""
+    inside = slice(first, end)
+    begin, fps = take.start_time + first / take.motion.fps, take.motion.fps
+    until = begin + (end - first) / fps
+    seams = take.seams[(take.seams >= first) & (take.seams < end)] - first
+    ball = take.ball
+    if ball is not None:
+        turns = None if ball.rotations is None else ball.rotations[inside]
+        ball = BallPath(ball.times[inside], ball.positions[inside], ball.measured[inside], turns)
+    values = {name: getattr(take, name) for name in ("correction", "ik_miss", "stepped")}
+    return replace(
+        take, motion=take.motion.frames(first, end), start_time=begin, clip=take.clip[inside],
+        clip_frame=take.clip_frame[inside], mirrored=take.mirrored[inside], words=take.words[inside],
+        contacts=take.contacts[inside], seams=seams, ball=ball,
+        **{name: None if each is None else each[inside] for name, each in values.items()},
+        timeline=_between(take.timeline, begin, until),
+        keys=tuple(
+            replace(key, frame=key.frame - first) for key in take.keys if _within(key.asked.in_force, begin, until)
+        ),
+        pins=tuple(pin for pin in take.pins if _within(pin.pin.time, begin, until)),
+        dribbled=tuple(
+            DribbleTouch(max(one.first - first, 0), min(one.last, end - 1) - first, one.side)
+            for one in take.dribbled if one.first < end and one.last >= first
+        ),
+        warnings=tuple(line for line in take.warnings if _told_in(line, begin, until)),
+        unpinned=None, met_ball=None, plan=None, edit=None,
+    )  # fmt: skip
+
+
+def _within(time: float, begin: float, until: float) -> bool:
+    return begin - _SAME_TIME <= time < until - _SAME_TIME
+
+
+def _told_in(line: str, begin: float, until: float) -> bool:
+    """Whether a line is about no time, or about one that begins here."""
+    spans = spans_of(line)
+    return not spans or _within(spans[0][0], begin, until)
+
+
+def _between(timeline: Timeline, begin: float, until: float) -> Timeline:
+    """Spans cut to a time, and the key moments in it."""
+    spans = [span for span in timeline.spans if span.start < until - _SAME_TIME and span.end > begin + _SAME_TIME]
+    cut = [replace(span, start=max(span.start, begin), end=min(span.end, until)) for span in spans]
+    return Timeline(tuple(cut), tuple(key for key in timeline.keys if _within(key.in_force, begin, until)))
+
+
+def one_take(takes: Sequence[Take], plan: Plan) -> Take:
+    """Takes that follow each other without a gap, as one; plan: the order of their time."""
+    clips = tuple(dict.fromkeys(path for take in takes for path in take.clips))
+    number = {path: index for index, path in enumerate(clips)}
+    firsts = np.cumsum([0, *(len(take.motion) for take in takes)])
+    seams = np.concatenate([take.seams + first for take, first in zip(takes, firsts)])
+    arrays = ("clip_frame", "mirrored", "contacts", "correction", "ik_miss", "stepped")
+    begin, fps = takes[0].start_time, takes[0].motion.fps
+    return replace(
+        takes[0], motion=concatenate([take.motion for take in takes]), clips=clips,
+        clip=np.concatenate([np.array([number[path] for path in take.clips], int)[take.clip] for take in takes]),
+        **{name: np.concatenate([getattr(take, name) for take in takes]) for name in arrays},
+        words=tuple(words for take in takes for words in take.words), seams=seams[seams > 0],
+        timeline=_one_timeline([take.timeline for take in takes]),
+        keys=tuple(
+            replace(key, frame=key.frame + first) for take, first in zip(takes, firsts) for key in take.keys
+        ),
+        pins=tuple(pin for take in takes for pin in take.pins),
+        dribbled=tuple(
+            DribbleTouch(one.first + int(first), one.last + int(first), one.side)
+            for take, first in zip(takes, firsts) for one in take.dribbled
+        ),
+        ball=_one_ball(takes, begin + np.arange(firsts[-1]) / fps),
+        warnings=tuple(dict.fromkeys(line for take in takes for line in take.warnings)),
+        seconds={name: sum(take.seconds.get(name, 0.0) for take in takes) for name in takes[0].seconds},
+        plan=plan, solved=plan.solved,
+    )  # fmt: skip
+
+
+def _one_timeline(timelines: Sequence[Timeline]) -> Timeline:
+    """Timelines one after the other; a span that goes on in the next is one span."""
+    spans: list[Span] = []
+    for span in sorted((s for each in timelines for s in each.spans), key=lambda span: (span.words, span.start)):
+        last = spans[-1] if spans else None
+        same = last is not None and (last.words, last.avoid) == (span.words, span.avoid)
+        if same and span.start <= last.end + _SAME_TIME:
+            spans[-1] = replace(last, end=max(last.end, span.end))
+        else:
+            spans.append(span)
+    return Timeline(tuple(spans), tuple(key for each in timelines for key in each.keys))
+
+
+def _one_ball(takes: Sequence[Take], times: np.ndarray) -> BallPath | None:
+    """The ball of all takes; unknown where one has none, None where none has any. times: (T,) s of all frames."""
+    if all(take.ball is None for take in takes):
+        return None
+    empty = [(np.full((len(take.motion), 3), np.nan), np.zeros(len(take.motion), bool)) for take in takes]
+    pairs = [none if take.ball is None else (take.ball.positions, take.ball.measured)
+             for take, none in zip(takes, empty)]  # fmt: skip
+    places, measured = (np.concatenate(column) for column in zip(*pairs))
+    return BallPath(times, places, measured)

@@ -23,7 +23,7 @@ from ..base.errors import InputError
 from ..files.content import content
 from ..files.tables import plain
 from ..files.whole import atomic_write
-from .pieces.content_digest import digest_of
+from .order import digest_of
 
 STATE = "match.json"
 WORDS = "annotations"
@@ -82,7 +82,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
     """
     check_folder(path)
     new, kept = not path.exists(), (path / _WORK).exists()
-    if (path / STATE).exists() and not _has_pieces(path):
+    if (path / STATE).exists() and not any((path / _WORK).glob("*/*.npz")):  # nothing that a run can go on from
         _own_state(path)
     try:
         (path / _WORK).mkdir(parents=True, exist_ok=True)
@@ -103,11 +103,6 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
                     path.rmdir() if new else None
 
 
-def _has_pieces(path: Path) -> bool:
-    """Whether there is work of ours that a run can go on from."""
-    return any((path / _WORK).glob("*/*.npz"))
-
-
 def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tuple[str, ...]]:
     """What match.json says, and lines for people: a damaged one is set aside. InputError where it is another version's,
     or is damaged and still says that it is another order's."""
@@ -123,8 +118,7 @@ def _state_before(path: Path, identity: Mapping[str, object]) -> tuple[dict, tup
 
 def _digest_kept(path: Path) -> dict[str, str]:
     """The digest of the order whose match.json is damaged, as far as that or the pieces' folder still says."""
-    told = _DIGEST.search((path / STATE).read_bytes()[:_HEAD])
-    if told:
+    if told := _DIGEST.search((path / STATE).read_bytes()[:_HEAD]):
         return {"digest": told[1].decode()}
     kept = path / _WORK / _ORDER
     return {"digest": kept.read_text("ascii", "replace")} if kept.is_file() else {}
@@ -162,17 +156,14 @@ def read_state(folder: str | os.PathLike) -> dict:
     except (ValueError, RecursionError) as error:
         raise _Damaged(path, f"no JSON ({' '.join(str(error).split())[:80]})") from None
     players = state.get("players") if isinstance(state, dict) else None
-    if not isinstance(players, list) or not all(isinstance(one, dict) and _is_id(one.get("id")) for one in players):
+    ids = [one.get("id") if isinstance(one, dict) else None for one in players] if isinstance(players, list) else [None]
+    if not all(isinstance(one, str) and one for one in ids):
         raise _Damaged(path, "no list of players")
     if "version" not in state:
         raise _Damaged(path, "no version")
     if state["version"] != VERSION:
         raise InputError(path, f"version {state['version']}", f"{VERSION}", "make the match anew with this version")
     return state
-
-
-def _is_id(value) -> bool:
-    return isinstance(value, str) and bool(value)
 
 
 def file_names(ids: Iterable[str]) -> dict[str, str]:
@@ -214,10 +205,8 @@ def _check_order(path: Path, before: dict, identity: Mapping[str, object]) -> No
     known = plain(dict(identity)).items() if isinstance(earlier, dict) else ()
     other = next((name for name, value in known if earlier.get(name) != value), None)
     what = f" (its {_NAMES.get(other, other)} differs)" if other else ""
-    raise InputError(
-        path, f"holds the results of another order{what}",
-        "a folder of this order's own", "choose another folder, or delete this one",
-    )
+    raise InputError(path, f"holds the results of another order{what}", "a folder of this order's own",
+                     "choose another folder, or delete this one")
 
 
 _NAMES = {

@@ -10,7 +10,7 @@ order goes on where it was, and comes to the same bits.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,16 +27,16 @@ from ..library.library import Library
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
 from .folder import check_folder, file_names, opened, read_state
-from .labels.words import MatchWords, words_of
 from .match_ball import ball_plan, course, met
 from .order import MatchOrder, identity
 from .parts import check_texts, parts_of, strange_texts, unused_lines
 from .pieces import stages
 from .pieces.pool import Workplace, check_place, ended
-from .pieces.workplace_library import LibrarySource, hold
-from .report.thumbnails import thumbnails
+from .pieces.work import LibrarySource, hold
+from .report.pictures import thumbnails
 from .roles import absent_lines, pushed_apart, roles_of, span_of
 from .state import begun, now, row_of
+from .words import MatchWords, words_of
 
 AROUND = 5.0
 """Seconds before and behind the span in which the ball is solved too."""
@@ -87,7 +87,8 @@ def make_match(
     report(0.0, f"Reading {order.tracking.name}")
     match = read_match(order.tracking, order.meta, order.provider or None)
     span = span_of(match, order)
-    events = _events(order, match)
+    events = None if order.events is None else read_events(order.events, order.events_meta,
+                                                           order.events_provider or None, match)
     read = now()
     library, source = _library(order, _part(report, "library"), cancelled)
     known = identity(order, source.key)
@@ -113,22 +114,12 @@ def make_match(
 
 def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, LibrarySource]:
     """The library, with all that it has to make kept beside its cache, and how workers find it."""
-    where = order.library, order.cache, order.skeleton, order.unit, order.seed
-    folder, cache, skeleton, unit, seed = where
-    library = build(
-        folder, cache_dir=cache, skeleton=skeleton, unit=unit, seed=seed, progress=report, cancelled=cancelled
-    )
+    library = build(order.library, cache_dir=order.cache, skeleton=order.skeleton, unit=order.unit, seed=order.seed,
+                    progress=report, cancelled=cancelled)
     library.extended  # worked out once, here, instead of by every worker  # noqa: B018
-    source = LibrarySource(*where, key=library.kept[1])
+    source = LibrarySource(order.library, order.cache, order.skeleton, order.unit, order.seed, library.kept[1])
     hold(source, library)
     return library, source
-
-
-def _events(order: MatchOrder, match: Match) -> MatchEvents | None:
-    """What people wrote down, where they did."""
-    if order.events is None:
-        return None
-    return read_events(order.events, order.events_meta, order.events_provider or None, match)
 
 
 def _make(
@@ -143,7 +134,8 @@ def _make(
     clock = now()
     words = _words(job, match, events, solved)
     inside = (match.times >= span[0] - 1e-6) & (match.times <= span[1] + 1e-6)
-    roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], _touches(words))
+    touches = {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
+    roles, state.told["spacing"] = pushed_apart(roles, match.times[inside], touches)
     names = file_names(player.id for player in match.players)
     parts = parts_of(roles, names, words, solved=solved, order=job.order, folder=job.folder,
                      known_words=job.library.words)
@@ -155,14 +147,14 @@ def _make(
     state.took("words", clock)
     state.write()
     clock = now()
-    edits = stages.search(job.told(_part(report, "search")), parts)
+    edits = stages.search(replace(job, report=_part(report, "search")), parts)
     state.took("search", clock)
     clock = now()
-    crowd = stages.keep_apart(job.told(_part(report, "crowd")), edits, span) if edits else {}
+    crowd = stages.keep_apart(replace(job, report=_part(report, "crowd")), edits, span) if edits else {}
     ball = _ball(job, match, solved, span, crowd)
     state.took("crowd", clock)
     clock = now()
-    stages.finish(job.told(_part(report, "figures")), parts, edits, crowd, ball)
+    stages.finish(replace(job, report=_part(report, "figures")), parts, edits, crowd, ball)
     state.took("figures", clock)
     state.took("total", begin)
     _close(job, crowd)
@@ -188,11 +180,6 @@ def _words(job: stages.Job, match: Match, events: MatchEvents | None, solved: So
     told["notes"] += words.notes
     told["events"] = dict(words.figures) or None
     return words
-
-
-def _touches(words: MatchWords) -> dict[str, list[float]]:
-    """Seconds of everybody's key moments."""
-    return {player: [one.time for one in moments if one.end is None] for player, moments in words.players.items()}
 
 
 def _ball(job: stages.Job, match: Match, solved: SolvedBall | None, span, crowd) -> BallPath:

@@ -12,11 +12,10 @@ from ..base.errors import InputError, told_time
 from ..synthesis.known_touches import course_of
 from ..synthesis.plan import Plan
 from .folder import MatchFolder
-from .labels.words import USER, MatchWords, Moment, timeline_of
-from .labels.words_text import edited, read_words, write_words
 from .order import MatchOrder
 from .player_edit import kept
 from .roles import Role
+from .words import USER, MatchWords, Moment, edited, read_words, timeline_of, write_words
 
 
 @dataclass(frozen=True, eq=False)

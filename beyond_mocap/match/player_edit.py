@@ -1,17 +1,30 @@
-"""All that is kept of a player of a match: what he was asked to do, and which clip is shown when; his motion is made of
-it whenever it is wanted (`expand`)."""
+"""All that is kept of a player of a match, and its file: what they were asked to do, and which clip is shown when;
+their motion is made of it whenever it is wanted (`expand`).
+
+ID.take.npz (docs/match/match.md) is a zip of plain arrays of whole numbers and a few fractions, with one JSON text for
+what is no array. Places are in millimetres and times in microseconds, as differences of differences, which pack well.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+import io
+import json
+import os
+from dataclasses import asdict, dataclass, fields, replace
 
 import numpy as np
 
+from ..annotation import KeyMoment, Span, Timeline
+from ..base.errors import InputError
+from ..files.content import content
+from ..files.json_values import check_names, entries, number, numbers, object_of, shown, text, truth, whole_number
+from ..files.plain_npz import HEADER, header_text, plain_arrays
+from ..files.whole import atomic_write
 from ..motion.track import Track
 from ..synthesis.known_touches import solve_touches
-from ..synthesis.plan import Plan, SolvedCourse
+from ..synthesis.plan import METHODS, Pin, Plan, SolvedCourse, Touched
 from .crowd.correction import Correction
-from .pieces.named_edit import NamedEdit
+from .pieces.named_edit import NamedEdit, NamedKey
 
 COURSE_STEP = 0.02
 """Seconds between the points of the ball's course that are kept; gravity bends it by half a millimetre in between, a
@@ -21,6 +34,24 @@ LAYOUT = 30.0
 """Seconds of the windows in which a player is laid out."""
 
 _MOST_STEPS = 10_000_000
+VERSION = 1
+FORMAT = "Beyond Mocap player of a match"
+LARGEST = 200_000_000
+"""Bytes of a file above which it is none of ours."""
+UNPACKED = 1_000_000_000
+"""Bytes of all its arrays together above which it is none of ours."""
+_KIND = "a player of a match (ID.take.npz)"
+_PAGE = "docs/match/match.md"
+_TYPES = tuple(np.dtype(name) for name in ("<f8", "<i8", "<i4", "<i2", "|i1", "|u1"))
+_LONGEST = 24 * 3600.0
+"""Seconds of a stretch above which it is none of ours."""
+_MOST_FRAMES, _MOST_RATE = 1e7, 100.0
+_LEAST_WINDOW = 1.0  # s
+_DEFAULTS = {
+    field.name: field.default for field in fields(Plan) if field.name not in ("track", "timeline", "pins", "solved")
+}  # fmt: skip
+_RUN_TYPES = {"clip": "<i2", "first": "<f8", "rate": "<f8", "length": "<i4", "cut": "|u1"}
+_UNKNOWN = -(2**31)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +99,66 @@ def course_times(first: float, last: float, touches) -> np.ndarray:
     return np.union1d(first + (last - first) / steps * np.arange(steps + 1), inside)
 
 
+def write_player(path: str | os.PathLike, edit: PlayerEdit) -> None:
+    """Write a player as `read_player` reads it, number for number; its plans are as `kept` has them. The same player
+    gives the same bytes. InputError where the file cannot be written."""
+    arrays, stretches = {}, []
+    for index, stretch in enumerate(edit.stretches):
+        stretches.append(_stretch_out(stretch))
+        arrays |= {f"{index}/{name}": values for name, values in _stretch_arrays(stretch).items()}
+    apart = edit.correction
+    header = {
+        "format": FORMAT, "version": VERSION, "player": edit.player, "window": edit.window, "stretches": stretches,
+        "correction": None if apart is None else [apart.fps, apart.step],
+    }  # fmt: skip
+    if apart is not None:
+        arrays |= {"knots": apart.knots, "values": apart.values}
+    arrays[HEADER] = np.frombuffer(json.dumps(header, allow_nan=False).encode(), np.uint8)
+    whole = io.BytesIO()
+    np.savez_compressed(whole, **dict(sorted(arrays.items())))
+    atomic_write(path, whole.getvalue())
+
+
+def read_player(path: str | os.PathLike) -> PlayerEdit:
+    """The player that a file holds. InputError, one line that begins with the file's name, for whatever is wrong with
+    it."""
+    data = content(path, _KIND, LARGEST)
+    try:
+        return _player(plain_arrays(data, _KIND, _TYPES, UNPACKED))
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+
+
+def packed_places(metres: np.ndarray) -> np.ndarray:
+    """Places (N, k) m, to the millimetre and NaN where they are not known, as `places` reads them."""
+    return packed(np.where(np.isnan(metres), _UNKNOWN, np.round(np.nan_to_num(metres) * 1000.0)))
+
+
+def packed(values: np.ndarray) -> np.ndarray:
+    """Whole numbers (N, k) as differences of differences, in the smallest type that holds them."""
+    once = np.diff(values.astype(np.int64), axis=0, prepend=0)
+    twice = once.copy()
+    twice[2:] = np.diff(once[1:], axis=0)
+    most = np.abs(twice).max(initial=0)
+    return twice.astype(next(kind for kind in ("<i2", "<i4", "<i8") if most <= np.iinfo(kind).max))
+
+
+def places(values: np.ndarray, where: str) -> np.ndarray:
+    """(N, k) m of what `packed_places` has packed. InputError, with `where` before it, for other than whole numbers."""
+    whole = unpacked(values, where)
+    return np.where(whole == _UNKNOWN, np.nan, whole / 1000.0)
+
+
+def unpacked(values: np.ndarray, where: str) -> np.ndarray:
+    """What `packed` has packed, as floating point numbers. InputError, with `where` before it, for other than whole
+    numbers."""
+    if values.dtype.kind != "i":
+        raise InputError(where, f"values of type {values.dtype}", "whole numbers")
+    once = values.astype(np.int64)
+    once[1:] = np.cumsum(once[1:], axis=0)
+    return np.cumsum(once, axis=0).astype(float)
+
+
 def _kept_course(course: SolvedCourse, track: Track) -> SolvedCourse:
     times = course_times(float(track.times[0]), float(track.times[-1]), course.touches)
     ball, filled = course.at(times)
@@ -76,3 +167,198 @@ def _kept_course(course: SolvedCourse, track: Track) -> SolvedCourse:
 
 def _to_millimetres(places: np.ndarray) -> np.ndarray:
     return np.round(places * 1000.0) / 1000.0
+
+
+# -- writing
+
+
+def _stretch_out(stretch: Stretch) -> dict:
+    plan, course = stretch.plan, stretch.plan.solved
+    return {
+        "name": plan.track.name, "settings": {name: getattr(plan, name) for name in _DEFAULTS},
+        "spans": [[span.start, span.end, list(span.words), list(span.avoid)] for span in plan.timeline.spans],
+        "keys": [[key.time, list(key.words), list(key.avoid), key.solved] for key in plan.timeline.keys],
+        "pins": [asdict(pin) for pin in plan.pins],
+        "touches": None if course is None else [list(asdict(touch).values()) for touch in course.touches],
+        "clips": [list(clip) for clip in stretch.edit.clips],
+        "placed": [list(asdict(key).values()) for key in stretch.edit.keys],
+        "warnings": [str(line) for line in stretch.warnings], "short": [list(span) for span in stretch.short],
+    }  # fmt: skip
+
+
+def _stretch_arrays(stretch: Stretch) -> dict[str, np.ndarray]:
+    track, course = stretch.plan.track, stretch.plan.solved
+    flags = track.ball_height_known + 2 * track.filled + 4 * track.outlier
+    arrays = {name: getattr(stretch.edit, name).astype(kind) for name, kind in _RUN_TYPES.items()}
+    arrays |= {"flags": flags.astype(np.uint8), "times": packed(np.round(track.times * 1e6)[:, None]),
+               "positions": packed_places(track.positions), "ball": packed_places(track.ball)}  # fmt: skip
+    if course is not None:
+        arrays |= {"course": packed_places(course.ball), "course_filled": course.filled.astype(np.uint8)}
+    return arrays
+
+
+# -- reading
+
+
+def _player(arrays: dict[str, np.ndarray]) -> PlayerEdit:
+    """The player that arrays make; every array is used once, none is left over."""
+    header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
+    if not isinstance(header, dict) or header.get("format") != FORMAT:
+        raise InputError(HEADER, "no player of a match", _KIND, "choose another file")
+    if header.get("version") != VERSION:
+        raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
+    rows = ("format", "version", "player", "window", "stretches", "correction")
+    check_names(header, HEADER, rows, rows)
+    stretches = [_stretch(row, index, arrays) for index, row in enumerate(entries(header["stretches"], "stretches"))]
+    apart = _correction(header["correction"], arrays)
+    window = number(header["window"], "window")
+    if window < _LEAST_WINDOW:
+        raise InputError("window", f"{window:g} s", f"{_LEAST_WINDOW:g} s or more")
+    if arrays:
+        raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
+    return PlayerEdit(text(header["player"], "player"), window, tuple(stretches), apart)
+
+
+def _correction(value, arrays: dict[str, np.ndarray]) -> Correction | None:
+    if value is None:
+        return None
+    fps, step = _row(value, "correction", 2)
+    knots, values = arrays.pop("knots", None), arrays.pop("values", None)
+    if knots is None or values is None or knots.dtype.kind != "i" or values.dtype != np.int16:
+        raise InputError("correction", "no knots, or no values of whole numbers", "both")
+    return Correction(knots, values, number(fps, "correction"), whole_number(step, "correction"))
+
+
+def _stretch(row, index: int, arrays: dict[str, np.ndarray]) -> Stretch:
+    where = f"stretch {index}"
+    names = ("name", "settings", "spans", "keys", "pins", "touches", "clips", "placed", "warnings", "short")
+    check_names(row, where, names, names)
+
+    def array(name: str, columns: int | None = None, count: int | None = None) -> np.ndarray:
+        values = arrays.pop(f"{index}/{name}", None)
+        ends = () if columns is None else (columns,)
+        if values is None or values.shape[1:] != ends or values.ndim != 1 + len(ends):
+            found = "no such array" if values is None else f"shape {values.shape}"
+            raise InputError(f"{where}: {name}", found, f"(rows{''.join(f', {end}' for end in ends)})")
+        if count is not None and len(values) != count:
+            raise InputError(f"{where}: {name}", f"{len(values)} rows", str(count))
+        return values
+
+    return Stretch(
+        _plan(row, where, array), _edit(row, where, array),
+        tuple(text(line, f"{where}: warnings") for line in entries(row["warnings"], f"{where}: warnings")),
+        tuple(_pair(span, f"{where}: short") for span in entries(row["short"], f"{where}: short")),
+    )  # fmt: skip
+
+
+def _pair(value, where: str) -> tuple[float, float]:
+    start, end = _row(value, where, 2)
+    return number(start, where), number(end, where)
+
+
+def _row(value, where: str, count: int) -> list:
+    row = entries(value, where)
+    if len(row) != count:
+        raise InputError(where, shown(value), f"{count} values")
+    return row
+
+
+def _words(value, where: str) -> tuple[str, ...]:
+    return tuple(text(word, where) for word in entries(value, where))
+
+
+def _plan(row, where: str, array) -> Plan:
+    track = _track(row, where, array)
+    first, last = track.times[0], track.times[-1]
+    spans, keys = [], []
+    for value in entries(row["spans"], f"{where}: spans"):
+        start, end, words, avoid = _row(value, f"{where}: spans", 4)
+        spans.append(Span(number(start, where), number(end, where), _words(words, where), avoid=_words(avoid, where)))
+    for value in entries(row["keys"], f"{where}: keys"):
+        time, words, avoid, solved = _row(value, f"{where}: keys", 4)
+        solved = None if solved is None else number(solved, where)
+        keys.append(KeyMoment(number(time, where), _words(words, where), None, _words(avoid, where), solved))
+    pins = [_pin(value, f"{where}: pins") for value in entries(row["pins"], f"{where}: pins")]
+    return Plan(
+        track=track, timeline=Timeline(tuple(spans), tuple(keys)), pins=tuple(pins),
+        solved=_course(row, where, array, float(first), float(last)),
+        **_settings(row["settings"], f"{where}: settings"),
+    )  # fmt: skip
+
+
+def _pin(value, where: str) -> Pin:
+    names = ("time", "part", "position", "hold")
+    check_names(value, where, names, names)
+    place = numbers(value["position"], where, 3, "[x, y, z] m")
+    return Pin(number(value["time"], where), text(value["part"], where), place, number(value["hold"], where))
+
+
+def _settings(value, where: str) -> dict:
+    """A plan's plain settings, each of the kind of its default; those that came later may be missing."""
+    check_names(value, where, _DEFAULTS, ())
+    kinds = {bool: truth, int: whole_number, float: number, str: text}
+    out = {}
+    for name, found in value.items():
+        kind = kinds.get(type(_DEFAULTS[name]))
+        out[name] = kind(found, f"{where}: {name}") if kind else _texts(found, f"{where}: {name}")
+    if out.get("method", METHODS[0]) != METHODS[0]:
+        raise InputError(f"{where}: method", shown(out["method"]), METHODS[0])
+    return out
+
+
+def _texts(value, where: str) -> tuple:
+    """Texts, or pairs of texts."""
+    rows = entries(value, where)
+    return tuple(text(row, where) if isinstance(row, str) else _words(_row(row, where, 2), where) for row in rows)
+
+
+def _track(row, where: str, array) -> Track:
+    times = unpacked(array("times", 1), f"{where}: times")[:, 0] / 1e6
+    if len(times) < 2 or np.any(np.diff(times) <= 0.0) or times[-1] - times[0] > _LONGEST:
+        raise InputError(f"{where}: times", f"{len(times)} of them", "two or more that rise, within a day")
+    positions = places(array("positions", 2, len(times)), f"{where}: positions")
+    if np.isnan(positions).any():
+        raise InputError(f"{where}: positions", "one that is not known", "a cleaned track")
+    flags = array("flags", None, len(times)).astype(int)
+    known, filled, outlier = ((flags & bit) > 0 for bit in (1, 2, 4))
+    ball = places(array("ball", 3, len(times)), f"{where}: ball")
+    return Track(times, positions, ball, ball_height_known=known, filled=filled, outlier=outlier,
+                 name=text(row["name"], f"{where}: name"))
+
+
+def _course(row, where: str, array, first: float, last: float) -> SolvedCourse | None:
+    if row["touches"] is None:
+        return None
+    touches = []
+    for value in entries(row["touches"], f"{where}: touches"):
+        time, mine, part, kind = _row(value, f"{where}: touches", 4)
+        mine = None if mine is None else truth(mine, where)
+        touches.append(Touched(number(time, where), mine, text(part, where), text(kind, where)))
+    times = course_times(first, last, touches)
+    ball = places(array("course", 3, len(times)), f"{where}: course")
+    return SolvedCourse(times, ball, array("course_filled", None, len(times)) > 0, tuple(touches))
+
+
+def _edit(row, where: str, array) -> NamedEdit:
+    clips = [_row(value, f"{where}: clips", 2) for value in entries(row["clips"], f"{where}: clips")]
+    clips = tuple((text(path, where), truth(mirrored, where)) for path, mirrored in clips)
+    first = array("first")
+    runs = {name: first if name == "first" else array(name, None, len(first)) for name in _RUN_TYPES}
+    length, clip = runs["length"], runs["clip"]
+    if not len(first) or np.any(length < 1) or length.sum(dtype=np.int64) > _MOST_FRAMES:
+        raise InputError(f"{where}: length", f"{len(first)} runs", "one or more, each of a frame or more, within a day")
+    if np.any(clip < 0) or np.any(clip >= len(clips)):
+        raise InputError(f"{where}: clip", f"{clip.min()} to {clip.max()}", f"0 to {len(clips) - 1}")
+    if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
+        raise InputError(f"{where}: first, rate", "more than any clip has", f"frames to {_MOST_FRAMES:g}")
+    keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
+    return NamedEdit(clips=clips, **runs, keys=keys)
+
+
+def _named_key(value, clips: int, where: str) -> NamedKey:
+    time, clip, frame, start, end, words = _row(value, f"{where}: placed", 6)
+    if not 0 <= whole_number(clip, where) < clips:
+        raise InputError(f"{where}: placed", f"clip {shown(clip)}", f"0 to {clips - 1}")
+    frame, start, end = (number(each, f"{where}: placed") for each in (frame, start, end))
+    return NamedKey(time=number(time, where), clip=whole_number(clip, where), frame=frame, start=start, end=end,
+                    words=_words(words, where))

@@ -15,7 +15,7 @@ from ..motion.track.match_data import Match, MatchPlayer
 from .crowd.spacing import keeping, spaced
 from .crowd.variety import lags
 from .order import MatchOrder
-from .pieces.cut_plan import cut_track
+from .pieces.units import cut_track
 
 SHORTEST = 1.0
 """Seconds; who is there for less is not made."""
@@ -59,15 +59,10 @@ def roles_of(match: Match, order: MatchOrder, span: tuple[float, float]) -> tupl
     for wanted in order.players:
         if wanted not in known:
             raise InputError("--players", f"{wanted!r}", f"some of {', '.join(known)}")
-    asked = [
-        (number, player) for number, player in enumerate(match.players)
-        if not order.players or player.id in order.players
-    ]  # fmt: skip
     liked = lags(match.positions[:, _sampled(match, span)])
-    roles = [
-        replace(role, lag=float(liked[role.number]))
-        for which in asked if (role := _role(match, *which, span, order.fps)) is not None
-    ]  # fmt: skip
+    found = [_role(match, number, player, span, order.fps) for number, player in enumerate(match.players)
+             if not order.players or player.id in order.players]  # fmt: skip
+    roles = [replace(role, lag=float(liked[role.number])) for role in found if role is not None]
     if not roles:
         raise InputError("--from, --to", f"nobody is there {_from_to(span)}", "a time of play")
     return tuple(roles)
@@ -97,30 +92,20 @@ def _role(match: Match, number: int, player: MatchPlayer, span: tuple[float, flo
         for begin, end in match.stretches(player.id):
             begin, end = _on_frames(max(begin, span[0]), min(end, span[1]), fps)
             if end - begin >= SHORTEST:
-                track, found = clean(match.track(player.id, *_around(match, begin, end)))
-                tracks.append(_cut(track, begin, end, fps))
+                step = 1.0 / match.fps  # to the feed's samples around them
+                track, found = clean(match.track(player.id, begin - step, end + step))
+                begin, end = max(begin, track.times[0]), min(end, track.times[-1])
+                tracks.append(cut_track(track, *_on_frames(begin, end, fps)))
                 notes += found.lines
     except InputError as error:
         return Role(player=player, reason=str(error), number=number)
-    return Role(
-        player=player, measured=tuple(tracks), asked=tuple(tracks), notes=tuple(notes), number=number,
-    ) if tracks else None
+    own = tuple(tracks)
+    return Role(player=player, measured=own, asked=own, notes=tuple(notes), number=number) if own else None
 
 
 def _on_frames(start: float, end: float, fps: float) -> tuple[float, float]:
     """The first frame of the match's clock not before `start` and the last not behind `end`, s."""
     return float(np.ceil(start * fps - 1e-6) + 0.0) / fps, float(np.floor(end * fps + 1e-6)) / fps
-
-
-def _around(match: Match, start: float, end: float) -> tuple[float, float]:
-    """`start` and `end`, widened to the feed's samples around them."""
-    step = 1.0 / match.fps
-    return start - step, end + step
-
-
-def _cut(track: Track, start: float, end: float, fps: float) -> Track:
-    """The track from `start` to `end`, as far as it goes, on frames."""
-    return cut_track(track, *_on_frames(max(start, track.times[0]), min(end, track.times[-1]), fps))
 
 
 def pushed_apart(
@@ -134,10 +119,8 @@ def pushed_apart(
     """
     places = np.stack([_on_times(role.measured, times) for role in roles])
     step = float(np.median(np.diff(times)))
-    keep = [
-        keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
-        for role in roles
-    ]
+    keep = [keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)
+            for role in roles]  # fmt: skip
     shifts = spaced(times, places, np.stack(keep))
     moved = np.linalg.norm(shifts, axis=2)
     some = moved > 1e-3
@@ -160,8 +143,6 @@ def _shifted(role: Role, times: np.ndarray, shift: np.ndarray) -> Role:
     """The role asked to be `shift` (N, 2) m beside what was measured; the very same where it is nothing."""
     if not shift.any():
         return role
-    asked = []
-    for track in role.measured:
-        own = interpolate(track.times, times, shift)
-        asked.append(replace(track, positions=track.positions + own))
+    asked = (replace(track, positions=track.positions + interpolate(track.times, times, shift))
+             for track in role.measured)  # fmt: skip
     return replace(role, asked=tuple(asked))

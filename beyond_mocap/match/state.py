@@ -52,11 +52,8 @@ class MatchState:
         rows = [{name: value for name, value in row.items() if value is not None} for row in self.players.values()]
         memory = {"main": round(peak_memory(), 1), "worker": round(self.worker_memory, 1)}
         spent = {stage: round(seconds, 3) for stage, seconds in self.worker_seconds.items()}
-        told = {
-            **self.told, "players": rows, "seconds": self.seconds, "main_cpu_s": self.own_seconds,
-            "worker_cpu_s": spent, "peak_memory_mb": memory,
-        }  # fmt: skip
-        self.folder.tell(told)
+        self.folder.tell({**self.told, "players": rows, "seconds": self.seconds, "main_cpu_s": self.own_seconds,
+                          "worker_cpu_s": spent, "peak_memory_mb": memory})  # fmt: skip
         self._written = time.monotonic()
 
     def spent(self, stage: str) -> Callable[[Done], None]:

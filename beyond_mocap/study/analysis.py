@@ -14,8 +14,8 @@ import numpy as np
 from ..base.errors import InputError
 from ..evaluation.paired_tests import judged
 from .answers import Answers
+from .form import SAME, SCALE
 from .order import Study
-from .questions import SAME, SCALE
 
 ALPHA = 0.05
 
@@ -92,9 +92,10 @@ def analysed(study: Study, answers: Answers, better: Sequence[tuple[str, str]] =
     findings = [find(study, answers, new, old) for new, old in hypotheses]
     raised = holm([finding.p for finding in findings])
     findings = [Finding(**{**vars(finding), "holm_p": p}) for finding, p in zip(findings, raised)]
-    return Analysis(study=study, answers=answers, by_system=_by_system(study, answers),
-                    by_scenario=_by_scenario(study, answers), findings=tuple(findings),
-                    notes=tuple(_notes(study, answers)))  # fmt: skip
+    scenarios = () if study.pairs else study.scenarios
+    return Analysis(study=study, answers=answers, by_system=() if study.pairs else _by_system(study, answers),
+                    by_scenario=tuple((scenario, _by_system(study, answers, scenario)) for scenario in scenarios),
+                    findings=tuple(findings), notes=tuple(_notes(study, answers)))  # fmt: skip
 
 
 def holm(p: Sequence[float]) -> list[float]:
@@ -182,25 +183,14 @@ def _shares(name: str, values: list[int]) -> Shares:
     return Shares(name, counts, mean, float(np.std(values, ddof=1)) if len(values) > 1 else np.nan)
 
 
-def _values(study: Study, answers: Answers, system: str, scenario: str | None = None) -> list[int]:
-    """All ratings of a system, of one scenario or of all."""
-    names = {clip.name for clip in study.clips if clip.system == system and scenario in (None, clip.scenario)}
-    return [value for rater in answers.raters for name, value in answers.ratings[rater].items() if name in names]
-
-
-def _by_system(study: Study, answers: Answers) -> tuple[Shares, ...]:
-    if study.pairs:
-        return ()
-    return tuple(_shares(system, _values(study, answers, system)) for system in study.systems)
-
-
-def _by_scenario(study: Study, answers: Answers) -> tuple[tuple[str, tuple[Shares, ...]], ...]:
-    if study.pairs:
-        return ()
-    return tuple(
-        (scenario, tuple(_shares(system, _values(study, answers, system, scenario)) for system in study.systems))
-        for scenario in study.scenarios
-    )
+def _by_system(study: Study, answers: Answers, scenario: str | None = None) -> tuple[Shares, ...]:
+    """All ratings of each system, of one scenario or of all."""
+    out = []
+    for system in study.systems:
+        names = {clip.name for clip in study.clips if clip.system == system and scenario in (None, clip.scenario)}
+        rated = (answers.ratings[rater].items() for rater in answers.raters)
+        out.append(_shares(system, [value for row in rated for name, value in row if name in names]))
+    return tuple(out)
 
 
 def _notes(study: Study, answers: Answers) -> list[str]:

@@ -10,9 +10,8 @@ from pathlib import Path
 from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.tables import read_rows
-from .form import ANSWER_COLUMNS
+from .form import ANSWER_COLUMNS, BACKGROUND, SAME, SCALE
 from .order import Study
-from .questions import BACKGROUND, SAME, SCALE
 
 _LARGEST = 5_000_000
 

@@ -1,6 +1,7 @@
-"""What a rater fills in: one page that needs no network and sends nothing; the answers are saved as a file.
+"""What raters are asked, about themselves and of every clip (after Faustino App. C), and the page that they fill in.
 
-The page knows neutral names only. Who has no browser for it types into a table with the same questions.
+The page needs no network and sends nothing; the answers are saved as a file. It knows neutral names only. Raters
+without a browser for it type into a table with the same questions.
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ import csv
 import io
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..evaluation.html_page import Html, build_page, build_section, element, fragment
 from .order import Study
-from .questions import BACKGROUND, COMPARE, INTRODUCTION, RATE, SAME, SCALE
 
 MOVIES = (".mp4", ".webm", ".m4v", ".mov", ".gif")
 """What browsers show."""
@@ -77,6 +78,41 @@ document.getElementById("csv").addEventListener("click", () => save("csv"));
 document.getElementById("json").addEventListener("click", () => save("json"));
 show(0);
 """
+
+
+@dataclass(frozen=True)
+class Question:
+    """One question about the rater. key: in the answers. needed: whether it has to be answered. choices: (key,
+    text)."""
+
+    key: str
+    text: str
+    choices: tuple[tuple[str, str], ...]
+    needed: bool = False
+
+
+BACKGROUND = (
+    Question("age", "How old are you?", (
+        ("18-24", "18 to 24"), ("25-34", "25 to 34"), ("35-44", "35 to 44"), ("45-54", "45 to 54"),
+        ("55-64", "55 to 64"), ("65-74", "65 to 74"), ("75-", "75 or older"),
+    )),
+    Question("gender", "What is your gender?", (("woman", "Woman"), ("man", "Man"), ("other", "Another"))),
+    Question("characters", "How often, in a usual month, do you play games or watch films with animated people?", (
+        ("never", "Never"), ("twice", "Once or twice"), ("weekly", "About once a week"),
+        ("often", "Several times a week"), ("daily", "Every day"), ("unknown", "I don't know"),
+    ), needed=True),
+)  # fmt: skip
+SCALE = ("Very bad", "Bad", "Neither bad nor good", "Good", "Very good")
+"""Ratings 1 to 5."""
+RATE = "How natural does the movement look?"
+COMPARE = "Which movement looks more natural?"
+SAME = "same"
+INTRODUCTION = (
+    "You will see short clips of one football player each. Look only at how the body moves, and tell how natural that "
+    "looks to you. There are no right or wrong answers, and nobody asks for your name.",
+    "Every clip may be watched as often as you like. The first two are there to get used to the task; their answers do "
+    "not count.",
+)
 
 
 def form_page(study: Study, rater: str, sources: Mapping[str, str]) -> str:

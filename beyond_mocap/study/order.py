@@ -1,26 +1,36 @@
-"""Clips under neutral names, and in which order each rater sees them (Faustino §5.1.1).
+"""A study: clips under neutral names, in which order each rater sees them (Faustino §5.1.1), and both as a file.
 
 No rater can tell from a name which system made a clip; all see other orders, systems and scenarios mixed; two clips to
-get used to the task come first and do not count.
+get used to the task come first and do not count. Raters must not see study.json, which says who made what.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from ..base.digest import hex_digest
 from ..base.errors import InputError
+from ..files.content import utf8
+from ..files.tables import read_rows, write_report
 
 TRAINING = "training"
 """In place of a system: this clip comes first and does not count."""
-MOST_RATERS, MOST_CLIPS = 1000, 500
+MOST_CLIPS = 500
 _LETTERS = "bcdfghjkmnpqrstvwxyz23456789"  # no vowels, no words; nothing that looks like something else
 _LONG = 4  # letters of a clip's name
 _TRIES = 200  # random orders tried until one is new
+STUDY_FILE = "study.json"
+VERSION = 1
+COLUMNS = ("file", "system", "scenario")
+_LARGEST = 20_000_000
+_NAME = re.compile(r"[A-Za-z0-9_-]{1,40}")  # of clips and raters: files are called so
 
 
 @dataclass(frozen=True)
@@ -61,10 +71,6 @@ class Study:
         """Names of the two clips that do not count."""
         return tuple(clip.name for clip in self.clips if clip.system == TRAINING)
 
-    def clip(self, name: str) -> Clip:
-        """The clip of a neutral name; KeyError where there is none."""
-        return {clip.name: clip for clip in self.clips}[name]
-
     def counts(self, shown: Sequence[str]) -> bool:
         """Whether what is shown together counts."""
         return not set(shown) & set(self.training)
@@ -92,6 +98,46 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
         taken.add(order)
         orders[f"R{number + 1:02d}"] = order
     return Study(id=mark, seed=seed, pairs=pairs, clips=named, orders=orders)
+
+
+def read_clips(path: Path) -> tuple[Clip, ...]:
+    """The clips of a table `file,system,scenario`, without names; InputError with the line of a row that lacks one."""
+    clips = []
+    for place, row in read_rows(path, COLUMNS, separators=",;\t"):
+        for column in COLUMNS[:2]:
+            if not row[column]:
+                raise InputError(place, f"no {column}", f"{','.join(COLUMNS)} in each row", "complete the row")
+        clips.append(Clip(row["file"], row["system"], row["scenario"]))
+    return tuple(clips)
+
+
+def write_study(folder: Path, study: Study) -> None:
+    """Writes study.json into a folder."""
+    write_report(folder / STUDY_FILE, {
+        "version": VERSION, "study": study.id, "seed": study.seed, "pairs": study.pairs,
+        "clips": [{"name": c.name, "file": c.file, "system": c.system, "scenario": c.scenario} for c in study.clips],
+        "orders": study.orders,
+    })  # fmt: skip
+
+
+def read_study(folder: Path) -> Study:
+    """The study of a folder; InputError where its study.json is missing or is not of that form."""
+    path = Path(folder) / STUDY_FILE
+    text = utf8(path, "a study.json, as 'beyond-mocap study order' writes it", _LARGEST)
+    try:
+        told = json.loads(text)
+        json.dumps(told, ensure_ascii=False).encode("utf-8")  # halves of characters can be read but not written
+        clips = tuple(Clip(*(str(row[key]) for key in ("file", "system", "scenario", "name"))) for row in told["clips"])
+        names = {clip.name for clip in clips}
+        orders = {str(rater): tuple(_shown(row, names) for row in rows) for rater, rows in told["orders"].items()}
+        if told["version"] != VERSION or not isinstance(told["pairs"], bool) or len(names) != len(clips):
+            raise ValueError("another version")
+        if odd := next((name for name in (*names, *orders) if not _NAME.fullmatch(name)), None):
+            raise ValueError(f"{odd!r} is no name")
+        return Study(id=str(told["study"]), seed=int(told["seed"]), pairs=told["pairs"], clips=clips, orders=orders)
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, RecursionError) as error:
+        found = f"not of the form of a study ({type(error).__name__}: {error})"
+        raise InputError(path, found, "what 'study order' writes", "make the study again") from None
 
 
 def _order(clips: Sequence[Clip], rng: np.random.Generator, pairs: bool) -> tuple[tuple[str, ...], ...]:
@@ -133,3 +179,11 @@ def _check(clips: Sequence[Clip]) -> None:
     files = [clip.file for clip in clips]
     if twice := next((file for file in files if files.count(file) > 1), None):
         raise InputError("clips", f"{twice} twice", "a file for each row", "remove one of them")
+
+
+def _shown(row, names: set[str]) -> tuple[str, ...]:
+    """One entry of an order: one or two names that there are."""
+    shown = tuple(map(str, row))
+    if isinstance(row, (str, Mapping)) or not 1 <= len(shown) <= 2 or not set(shown) <= names:
+        raise ValueError(f"{row!r} in an order")
+    return shown

@@ -1,11 +1,18 @@
-"""The analysis of a study as JSON and as one page for a browser, which loads nothing; all names are escaped."""
+"""The analysis of a study as JSON and as one page for a browser, which loads nothing; all names are escaped.
+
+Ratings are drawn as diverging stacked bars: good answers to the right of zero, bad ones to the left, undecided ones
+half on each side (Robbins and Heiberger 2011; Faustino figs. 15 and 16).
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Sequence
+from typing import Any
 
-from ..evaluation import plots
+import numpy as np
+
 from ..evaluation.html_page import (
     Html,
     build_image,
@@ -18,16 +25,18 @@ from ..evaluation.html_page import (
     element,
     fragment,
 )
+from ..evaluation.plots import create_canvas, render_png, require_matplotlib
 from ..evaluation.report import rounded
-from . import bars
 from .analysis import ALPHA, Analysis, Finding, Shares
-from .questions import BACKGROUND, SCALE
+from .form import BACKGROUND, SCALE
 
 _COLUMNS = (
     ("mean", "difference", 2), ("low", "from", 2), ("high", "to", 2), ("t", "t", 2), ("p", "p", 4),
     ("holm_p", "p, Holm", 4), ("wilcoxon_p", "p, Wilcoxon", 4), ("pooled_p", "p, pooled", 4), ("d", "d", 2),
     ("delta", "delta", 2),
 )  # fmt: skip
+COLOURS = ("#b5482a", "#e3a587", "#d9d9d9", "#8fb8de", "#2563a8")
+_NAME: dict[str, Any] = {"fontsize": 9, "parse_math": False}  # a name may have dollars in it
 
 
 def study_report(found: Analysis) -> dict:
@@ -49,9 +58,9 @@ def study_report(found: Analysis) -> dict:
 
 def study_page(found: Analysis) -> str:
     """The page as text. InputError where matplotlib is not installed."""
-    plots.require_matplotlib()
+    require_matplotlib()
     unit = "choices: 1 always the first, -1 always the second" if found.study.pairs else "points of the scale"
-    drawn = bars.differences(found.findings, f"each rater's mean difference, {unit}")
+    drawn = differences(found.findings, f"each rater's mean difference, {unit}")
     return build_page(
         f"Study {found.study.id}", element("h1", f"How natural it looks: study {found.study.id}"),
         *(element("p", note) for note in found.notes),
@@ -61,11 +70,22 @@ def study_page(found: Analysis) -> str:
     )  # fmt: skip
 
 
+def place_bar(counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Left edges and widths (5,) in percent of a bar of counts (5,): the middle of the undecided lies at zero."""
+    share = 100.0 * np.asarray(counts, float) / max(float(np.sum(counts)), 1.0)
+    left = np.concatenate([[0.0], np.cumsum(share)[:-1]])
+    return left - (share[:2].sum() + share[2] / 2.0), share
+
+
 def _systems(found: Analysis) -> tuple[Html, Html]:
-    all_of_them, apart = bars.diverging([("", found.by_system)]), bars.diverging(found.by_scenario)
-    table = _table(found.by_system)
-    return (build_section("By system", build_image(all_of_them, "ratings by system"), table),
-            build_section("By scenario", build_image(apart, "ratings by scenario")))  # fmt: skip
+    pictures = (build_image(diverging([("", found.by_system)]), "ratings by system"),
+                build_image(diverging(found.by_scenario), "ratings by scenario"))  # fmt: skip
+    head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
+    rows = [
+        build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
+        for row in found.by_system
+    ]
+    return build_section("By system", pictures[0], build_table(head, rows)), build_section("By scenario", pictures[1])
 
 
 def p_text(p: float) -> str:
@@ -99,14 +119,6 @@ def _findings(found: Analysis) -> Html:
     return fragment(build_table(head, rows), element("p", told, class_="quiet"))
 
 
-def _table(rows: tuple[Shares, ...]) -> Html:
-    head = ("system", *map(build_title, (*SCALE, "mean", "sd")))
-    return build_table(head, [
-        build_row(row.name, *map(build_number_cell, row.counts), *(build_number_cell(x, 2) for x in (row.mean, row.sd)))
-        for row in rows
-    ])  # fmt: skip
-
-
 def _background(found: Analysis) -> list[Html]:
     parts = []
     for question in BACKGROUND:
@@ -118,9 +130,58 @@ def _background(found: Analysis) -> list[Html]:
 
 
 def _shares(row: Shares) -> dict:
-    return {"name": row.name, "counts": row.counts.tolist(), "mean": row.mean, "sd": row.sd}
+    return {**vars(row), "counts": row.counts.tolist()}
 
 
 def _cell(value: float, digits: int) -> Html:
     """A number; of four digits, which are those of a p, not below what they can show."""
     return element("td", "< 0.0001", class_="n") if digits == 4 and value < 1e-4 else build_number_cell(value, digits)
+
+
+def diverging(groups: Sequence[tuple[str, Sequence[Shares]]]) -> bytes:
+    """The picture as a PNG: for each group its title and a bar for each of its rows."""
+    lines = sum(len(rows) for _, rows in groups) + 0.6 * len(groups)
+    figure, (ax,) = create_canvas(1.1 + 0.36 * lines)
+    y, ticks, names = 0.0, [], []
+    for title, rows in groups:
+        if title:
+            ax.text(0.0, y, title, transform=ax.get_yaxis_transform(), weight="bold", va="center", **_NAME)
+            y += 0.8
+        for row in rows:
+            _bar(ax, y, row.counts)
+            ticks.append(y)
+            names.append(f"{row.name} ({int(row.counts.sum())})")
+            y += 1.0
+        y += 0.3
+    ax.set_yticks(ticks, names, **_NAME)
+    ax.set_ylim(y, -0.8)
+    ax.set_xlim(-100.0, 100.0)
+    ax.set_xticks(range(-100, 101, 25), [f"{abs(at)} %" for at in range(-100, 101, 25)])
+    ax.axvline(0.0, color="#333333", lw=0.8)
+    handles = [ax.barh([-9], [0.0], color=colour, label=text) for colour, text in zip(COLOURS, SCALE)]
+    ax.legend(handles=handles, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=5, fontsize=8, frameon=False)
+    return render_png(figure)
+
+
+def differences(findings: Sequence[Finding], unit: str) -> bytes:
+    """Each rater's difference as a dot, and the mean with its 95 % interval; a row for each finding."""
+    figure, (ax,) = create_canvas(0.9 + 0.55 * len(findings))
+    for row, finding in enumerate(findings):
+        spread = row + 0.16 * np.sin(2.4 * np.arange(len(finding.differences)))
+        ax.plot(finding.differences, spread, "o", color="#8fb8de", ms=5, alpha=0.8)
+        ax.plot([finding.low, finding.high], [row, row], color="#222222", lw=2)
+        ax.plot([finding.mean], [row], "D", color="#222222", ms=6)
+    ax.axvline(0.0, color="#b5482a", lw=1, ls="--")
+    ax.set_yticks(range(len(findings)), [f"{finding.new} - {finding.old}" for finding in findings], **_NAME)
+    ax.set_ylim(len(findings) - 0.4, -0.6)
+    ax.set_xlabel(unit, fontsize=8)
+    return render_png(figure)
+
+
+def _bar(ax, y: float, counts: np.ndarray) -> None:
+    for left, share, colour, count in zip(*place_bar(counts), COLOURS, counts):
+        ax.barh([y], [share], left=left, color=colour, height=0.72)
+        if share >= 4.0:
+            dark = colour in (COLOURS[0], COLOURS[-1])
+            ax.text(left + share / 2.0, y, str(int(count)), ha="center", va="center", fontsize=8,
+                    color="white" if dark else "#222222")  # fmt: skip

@@ -91,8 +91,8 @@ def _span(wanted: Wanted, state: dict) -> tuple[float, float]:
 
 def _people(wanted, state, library, ball, span, progress, cancelled) -> tuple[list[Person], list[str]]:
     """Everybody who is there and was made, and lines about the others."""
+    from ...beyond_mocap.match.player_edit import read_player
     from ...beyond_mocap.match.shown import shown
-    from ...beyond_mocap.match.take_npz import read_player
 
     people, lines, trouble = [], [], None
     asked = [player for player in state["players"] if not wanted.players or player["id"] in wanted.players]

@@ -89,7 +89,7 @@ class Prepared:
 def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     """Everything about one take. library: what it was made from; None: nothing is compared with its recordings."""
     from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
-    from ...beyond_mocap.evaluation.view import View
+    from ...beyond_mocap.evaluation.reference import View
     from ...beyond_mocap.synthesis.quality.played import played_from_take
 
     view = View(played_from_take(take), plan.track, take.timeline, library)

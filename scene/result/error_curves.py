@@ -74,7 +74,7 @@ def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
 def _values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     """(C, T) in the order of CURVES; where nothing is known 0, since a key needs a number."""
     from ...beyond_mocap.evaluation.per_frame import per_frame
-    from ...beyond_mocap.evaluation.view import View
+    from ...beyond_mocap.evaluation.reference import View
     from ...beyond_mocap.synthesis.quality.played import played_from_take
 
     take, unit = made.take, scene.beyond_mocap.library_unit or None

@@ -1,6 +1,6 @@
 """What a report says, as lines that a player's settings keep and the panel draws: columns with a tab between.
 
-- quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.judged`
+- quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.report`
   has it)
 - moments: text, seconds, status
 - warnings: text, seconds at which its stretches begin, with blanks between ("" where it is about no time)

@@ -82,28 +82,18 @@ def _capsules(same: _Same) -> tuple[Capsule, ...]:
         found.append(Capsule(body.left.upper_arm, body.right.upper_arm, radius["shoulders"]))
     for side, limb in enumerate((body.left, body.right)):
         if None not in (limb.upper_arm, limb.lower_arm, limb.hand):
-            found.append(Capsule(
-                limb.upper_arm, limb.lower_arm, radius["upper_arm"], beyond=0.0, limb="arm", side=side,
-            ))
-            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], beyond=size * HAND, limb="arm",
-                                 side=side))
-        found.append(Capsule(limb.upper_leg, limb.lower_leg, radius["upper_leg"], beyond=0.0, limb="leg", side=side,
-                             along=(0.0, 0.5)))
-        found.append(Capsule(limb.lower_leg, limb.foot, radius["lower_leg"], beyond=0.0, limb="leg", side=side,
-                             along=(0.5, 1.0)))
-        if limb.toe is not None:
-            found.append(Capsule(limb.foot, limb.toe, radius["foot"], beyond=0.0, limb="leg", side=side,
-                                 along=(1.0, 1.0)))
+            found.append(Capsule(limb.upper_arm, limb.lower_arm, radius["upper_arm"], limb="arm", side=side))
+            found.append(Capsule(limb.lower_arm, limb.hand, radius["lower_arm"], size * HAND, limb="arm", side=side))
+        leg = [(limb.upper_leg, limb.lower_leg, "upper_leg", (0.0, 0.5)),
+               (limb.lower_leg, limb.foot, "lower_leg", (0.5, 1.0)), (limb.foot, limb.toe, "foot", (1.0, 1.0))]
+        for start, end, part, along in leg if limb.toe is not None else leg[:2]:
+            found.append(Capsule(start, end, radius[part], limb="leg", side=side, along=along))
     return tuple(found)
 
 
 def lines(motion: Motion) -> np.ndarray:
     """(T, C, 2, 3) m: both ends of every capsule's line in the world."""
-    return lines_of(capsules(motion.skeleton), forward_kinematics(motion)[0])
-
-
-def lines_of(parts: tuple[Capsule, ...], places: np.ndarray) -> np.ndarray:
-    """The same from joints' places (T, J, 3) m."""
+    parts, places = capsules(motion.skeleton), forward_kinematics(motion)[0]
     start, end = (places[:, [getattr(part, name) for part in parts]] for name in ("start", "end"))
     way = end - start
     length = np.maximum(np.linalg.norm(way, axis=-1, keepdims=True), 1e-9)
@@ -173,14 +163,3 @@ def nearest(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray,
     t = np.clip((uv * s + vw) / vv, 0.0, 1.0)
     s = np.clip((uv * t - uw) / uu, 0.0, 1.0)
     return w + s[:, None] * u - t[:, None] * v, s, t
-
-
-def overlap(one: Motion, other: Motion) -> np.ndarray:
-    """(T,) m that two bodies are deep in each other at each of their common frames, negative where they are apart (then
-    only down to -1 m)."""
-    ends = lines(one), lines(other)
-    radii = tuple(np.array([part.radius for part in capsules(motion.skeleton)]) for motion in (one, other))
-    found = touching(*ends, radii, -1.0)
-    deepest = np.full(len(one), -1.0)
-    np.maximum.at(deepest, found.frame, found.depth)
-    return deepest

@@ -3,6 +3,11 @@
 The curves are: the root's shift over the ground, each foot's, and by which rotation each arm is turned about its
 shoulder. They are kept as whole tenths of millimetres and of milliradians, so that what is stored and what is in memory
 give the same bits, and are 0 between the pieces in which there is something to change.
+
+A leg whose foot is put elsewhere opens or closes its knee until the ankle is as far from the hip as it has to be, about
+the axis about which it is bent; a leg that is nearly straight and shows none, about the axis square to leg and foot,
+since knees point where toes do. Then the whole leg swings about the hip the shortest way. What comes out of a frame
+depends on no other frame; a foot that stays where it is leaves the leg as it is.
 """
 
 from __future__ import annotations
@@ -15,11 +20,12 @@ from scipy.interpolate import CubicSpline
 
 from ...base.easing import quintic_step_by_powers
 from ...base.errors import InputError
+from ...base.vectors import unit_vectors
+from ...motion import limb as two_bones
 from ...motion import quaternion
-from ...motion.humanoid import identify
+from ...motion.humanoid import Limb, identify
 from ...motion.motion import Motion, pose_kinematics
-from ...motion.skeleton import frozen_array
-from .leg_moved import in_parent, leg_moved
+from ...motion.skeleton import Skeleton, frozen_array
 
 ROOT, FEET, ARMS = slice(0, 2), slice(2, 6), slice(6, 12)
 """Columns: metres (x, y) of the root; metres of the left and the right foot; rotation vectors, rad, of both arms."""
@@ -30,6 +36,12 @@ UNIT = 1e-4
 
 KNOT_SECONDS = 0.1  # between the knots of a correction
 _NOTHING = 5e-4  # m and rad below which a curve changes nothing that anybody sees
+
+SOFT = 0.01
+"""Metres below full length from where on a leg eases."""
+
+_CLEAR = 0.05  # sine of a knee's bend below which its axis counts less and less
+_LEAST = 0.05  # m, the least distance from hip to ankle
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,8 +110,7 @@ def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
-    curves = correction.curves(first, len(motion))
-    return carried(motion, curves)
+    return carried(motion, correction.curves(first, len(motion)))
 
 
 def carried(motion: Motion, curves: np.ndarray) -> Motion:
@@ -142,3 +153,47 @@ def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correcti
     knots = np.array(sorted(total), int)
     values = np.array([np.round(total[knot]) for knot in knots.tolist()]).reshape(-1, CURVES)
     return Correction(knots, values, fps, step)
+
+
+def leg_moved(
+    skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray, shift: np.ndarray
+) -> dict[int, np.ndarray]:
+    """Local rotations (W, 4) by joint with which the ankle lies `shift` (W, 3) m from where the pose has it against the
+    hip; the foot keeps its rotation in the world.
+
+    places (W, J, 3) m and world (W, J, 4): of all joints in the pose that is given.
+    """
+    hip, knee, ankle = (places[:, joint] for joint in (limb.upper_leg, limb.lower_leg, limb.foot))
+    thigh, shin, line = knee - hip, ankle - knee, ankle - hip
+    lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift
+    own, wanted = np.linalg.norm(line, axis=1), np.linalg.norm(goal, axis=1)
+    eased = [two_bones.soft_distance(length, lengths[0] + lengths[1], SOFT) for length in (own, wanted)]
+    reach = np.clip(own + eased[1] - eased[0], _LEAST, lengths[0] + lengths[1])
+    opened = two_bones.inner_angle(*lengths, reach) - two_bones.inner_angle(*lengths, own)
+    toes = places[:, limb.toe_or_foot] - ankle if limb.toe is not None else np.zeros(line.shape)
+    bend = quaternion.about_axis(_hinge(thigh, shin, line, toes), -opened)
+    swing = quaternion.between(thigh + quaternion.rotate(bend, shin), goal)
+    lower = quaternion.multiply(bend, world[:, limb.lower_leg])
+    carried = quaternion.multiply(swing, quaternion.multiply(bend, world[:, skeleton.parents[limb.foot]]))
+    upper = quaternion.multiply(swing, world[:, limb.upper_leg])
+    return {
+        limb.upper_leg: in_parent(skeleton, world, limb.upper_leg, upper),
+        limb.lower_leg: in_parent(skeleton, world, limb.lower_leg, lower),
+        limb.foot: quaternion.multiply(quaternion.inverse(carried), world[:, limb.foot]),
+    }
+
+
+def in_parent(skeleton: Skeleton, world: np.ndarray, joint: int, turned: np.ndarray) -> np.ndarray:
+    """(W, 4): a world rotation of a joint as one against its parent's."""
+    return quaternion.multiply(quaternion.inverse(world[:, skeleton.parents[joint]]), turned)
+
+
+def _hinge(thigh: np.ndarray, shin: np.ndarray, line: np.ndarray, toes: np.ndarray) -> np.ndarray:
+    """(W, 3) unit: the axis about which the knee is bent, by which a positive turn bends it further."""
+    bones = np.linalg.norm(thigh, axis=1) * np.linalg.norm(shin, axis=1)
+    shows = np.cross(thigh, shin) / bones[:, None]
+    across = unit_vectors(np.cross(toes, line), np.array([0.0, 1.0, 0.0]))
+    share = np.clip(np.linalg.norm(shows, axis=1, keepdims=True) / _CLEAR, 0.0, 1.0)
+    mixed = share * unit_vectors(shows, across) + (1.0 - share) * across
+    down = unit_vectors(line, across)
+    return unit_vectors(mixed - np.sum(mixed * down, axis=1, keepdims=True) * down, across)

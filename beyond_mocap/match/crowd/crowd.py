@@ -20,9 +20,8 @@ from ...motion.motion import Motion
 from .capsules import FAR, capsules, lines, touching
 from .correction import CURVES, Correction, carried
 from .crowd_body import CrowdBody, moved
-from .episodes import Episode, Span, meetings
-from .pressure import Pressure
-from .pushing import ALLOWED, pushed
+from .pushing import ALLOWED, Pressure, pushed
+from .spacing import Episode, Span, meetings
 
 REACH = 1.5
 """Seconds before and behind an overlap within which something is changed."""
@@ -35,12 +34,9 @@ DONE = 0.015
 
 
 def kept_apart(
-    motions: Sequence[Motion],
-    contacts: Sequence[np.ndarray],
-    firsts: Sequence[int],
-    fps: float,
+    motions: Sequence[Motion], contacts: Sequence[np.ndarray], firsts: Sequence[int], fps: float,
     firm: Sequence[np.ndarray] | None = None,
-) -> tuple[Correction, ...]:
+) -> tuple[Correction, ...]:  # fmt: skip
     """What has to be changed on each of the motions so that no two of them are in each other.
 
     motions: on the pitch, frames at `fps` per second; firsts: the frame of the match's clock at which each begins.
@@ -136,7 +132,7 @@ def _part(episode: Episode, bodies: list[CrowdBody], curves: list[np.ndarray], p
 
 
 def _as_bent(body: CrowdBody, motion: Motion, curves: np.ndarray, first: int, start: int) -> CrowdBody:
-    """The body, told how far its limbs are from where the curves (T, 12) alone would have them."""
+    """The body, with how far its limbs are from where the curves (T, 12) alone would have them."""
     here = slice(first - start, first - start + len(motion))
     if not curves[here].any():
         return replace(body, bent=np.zeros(body.lines.shape))

@@ -1,26 +1,29 @@
-"""A window of time with everybody in it: bodies that would be in each other kept apart, and the ball where they meet
-it."""
+"""A window of time with all players in it: bodies that would be in each other kept apart, and the ball where they meet
+it; what the window says is kept in a file until it is needed again (never pickled)."""
 
 from __future__ import annotations
 
+import io
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from ...annotation.ball_contact import surfaces
+from ...files.whole import atomic_write
 from ...library.features import FPS
 from ...library.library import Library
 from ...motion.motion import Motion
 from ...synthesis.take import Take
 from ..expand import expanded
-from ..match_ball import course, led_by, met
-from ..pieces.cut_plan import cut_plan
+from ..match_ball import at_ball, course, led_by, met
 from ..pieces.named_edit import part
+from ..pieces.units import cut_plan
 from ..player_edit import PlayerEdit, Stretch
-from .correction import CURVES, Correction, applied
+from .correction import CURVES, Correction, applied, joined
 from .crowd import kept_apart, overlap_depths
-from .restore_ball_contact import at_ball
 from .spacing import keeping
 
 LONGEST = 60.0
@@ -33,6 +36,8 @@ REACH = 2.0
 """Seconds around an edge between two windows in which the corrections of one go over into the other's."""
 
 _SETTLED = 8.0  # s of an edit list, beyond those, by which its motion does not depend on where it begins
+
+_ARRAYS = ("frames", "depth", "led_frames", "led")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,19 +81,52 @@ def crowd_window(library: Library, edits: Sequence[PlayerEdit], start: float, en
         flat = [take for own in takes for take in own]
         fps = flat[0].motion.fps if flat else 1.0
         firsts = [round(take.start_time * fps) for take in flat]
-        firm = [_firm(take) for take in flat]
-        own, contacts = [take.motion for take in flat], [take.contacts for take in flat]
-        corrections = kept_apart(own, contacts, firsts, fps, firm)
+        plain, contacts = [take.motion for take in flat], [take.contacts for take in flat]
+        corrections = kept_apart(plain, contacts, firsts, fps, [_firm(take) for take in flat])
         led = [led_by(take) for take in flat]
-        motions = [applied(take.motion, *own) for take, own in zip(flat, zip(corrections, firsts))]
+        motions = [applied(motion, *own) for motion, own in zip(plain, zip(corrections, firsts))]
         motions = [_on_the_ball(*own, led) for own in zip(flat, motions, firsts)]
-        before = overlap_depths([take.motion for take in flat], firsts)
+        before = overlap_depths(plain, firsts)
         after = overlap_depths(motions, firsts)
     inside = round(start * fps), round(end * fps)
-    rows, out = iter(zip(corrections, firsts, before, after, led)), []
-    for own in takes:
-        out.append(_part([next(rows) for _ in own], inside, fps))
-    return tuple(out)
+    rows = iter(zip(corrections, firsts, before, after, led))
+    return tuple(_part([next(rows) for _ in own], inside, fps) for own in takes)
+
+
+def join_windows(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
+    """One player's windows, each with its start and end in seconds, as one."""
+    if not parts:
+        return _part([], (0, 0), fps)
+    cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
+    arrays = {name: np.concatenate([getattr(one, name) for one, _ in parts]) for name in _ARRAYS}
+    return CrowdPart(correction=joined(cores, round(REACH * fps)), before=max(one.before for one, _ in parts), **arrays)
+
+
+def keep_parts(path: Path, parts: Sequence[CrowdPart]) -> None:
+    """Writes a window's parts, in the order of the players; InputError where that cannot be done."""
+    arrays = {}
+    for number, one in enumerate(parts):
+        arrays |= {f"{number}.{name}": getattr(one, name) for name in _ARRAYS}
+        arrays |= {f"{number}.knots": one.correction.knots, f"{number}.values": one.correction.values}
+    header = [[one.correction.fps, one.correction.step, one.before] for one in parts]
+    out = io.BytesIO()
+    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def kept_parts(path: Path) -> tuple[CrowdPart, ...] | None:
+    """The parts that `keep_parts` wrote; None where there are none, or none that can be read whole."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            header = json.loads(kept["header"].tobytes())
+            return tuple(
+                CrowdPart(
+                    correction=Correction(kept[f"{number}.knots"], kept[f"{number}.values"], fps, step),
+                    before=before, **{name: kept[f"{number}.{name}"] for name in _ARRAYS},
+                ) for number, (fps, step, before) in enumerate(header)
+            )  # fmt: skip
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+        return None
 
 
 def _firm(take: Take) -> np.ndarray:
@@ -119,12 +157,12 @@ def _part(rows, inside: tuple[int, int], fps: float) -> CrowdPart:
         led.append(off[mine])
         core = slice(max(inside[0] - first, 0), max(inside[1] - first, 0))
         before = max(before, float(deep[core].max(initial=0.0)))
-    return CrowdPart(correction=in_turn([correction for correction, *_ in rows], fps), frames=np.concatenate(frames),
-                     depth=np.concatenate(depth), before=before, led_frames=np.concatenate(led_frames),
-                     led=np.concatenate(led))  # fmt: skip
+    arrays = {name: np.concatenate(values) for name, values in zip(_ARRAYS, (frames, depth, led_frames, led))}
+    correction = _one_after_the_other([correction for correction, *_ in rows], fps)
+    return CrowdPart(correction=correction, before=before, **arrays)
 
 
-def in_turn(corrections: Sequence[Correction], fps: float) -> Correction:
+def _one_after_the_other(corrections: Sequence[Correction], fps: float) -> Correction:
     """Corrections of one player at different times as one."""
     if not corrections:
         return Correction.none(fps)

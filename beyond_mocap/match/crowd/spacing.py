@@ -1,4 +1,5 @@
-"""Tracks that come nearer than two trunks allow pushed apart, before anything is made from them.
+"""Which bodies come near each other and when, and tracks that come nearer than two trunks allow pushed apart, before
+anything is made from them.
 
 The shifts are the least smooth ones: sum STAY (|s|^2 + SECONDS^6 |s'''|^2) over everybody, plus the square of what is
 lacking of the distance while two are too near. Which way they are pushed turns with how they lie to each other; where
@@ -8,13 +9,14 @@ direction over time, and they pass each other on the side on which they miss eac
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.time_series import runs
 from ...base.vectors import arctan2
 from ...motion.track import zero_phase_hann
-from .episodes import Episode, episodes
 
 DISTANCE = 0.55
 """Metres between the middles of two bodies that stand or run beside each other."""
@@ -31,6 +33,9 @@ STEADY = 30.0
 _TURNED = (1.0, 1.0, 0.8, 0.8, 0.6, 0.6, 0.4, 0.4, 0.2, 0.2, 0.1, 0.1)  # s over which directions are smoothed at first
 _ROUNDS, _STEP = 24, 0.5  # directions turn as bodies part, so shifts go half of the way each round
 _HELD = 1e6  # weight that holds a value: far above all others
+
+Span = tuple[int, int, tuple[int, int]]
+"""First frame, end, and the numbers of two bodies."""
 
 
 def spaced(
@@ -60,6 +65,61 @@ def keeping(count: int, moments: np.ndarray, fps: float, seconds: float = 0.6) -
         return np.ones(count)
     away = np.abs(np.arange(count)[:, None] - np.asarray(moments)).min(axis=1) / (seconds * fps)
     return 1.0 + (STEADY - 1.0) * np.cos(0.5 * np.pi * np.clip(away, 0.0, 1.0)) ** 2
+
+
+@dataclass(frozen=True)
+class Episode:
+    """Bodies that come near each other, one through the other. bodies: their numbers, ascending; first, end: frames;
+    pairs: (one, other) of those that do."""
+
+    bodies: tuple[int, ...]
+    first: int
+    end: int
+    pairs: tuple[tuple[int, int], ...]
+
+
+def episodes(positions: np.ndarray, distance: float, reach: int) -> list[Episode]:
+    """All times at which two of the positions (P, N, 2) m, NaN where somebody is not there, are nearer than `distance`
+    metres, `reach` frames before and behind included; what overlaps in time and shares a body is one episode."""
+    found = []
+    for one in range(len(positions) - 1):
+        off = positions[one + 1 :] - positions[one]
+        near = np.einsum("pnk,pnk->pn", off, off) < distance**2
+        for other in np.flatnonzero(near.any(axis=1)):
+            pair = (one, one + 1 + int(other))
+            found += [(max(low - reach, 0), min(high + reach, len(near[0])), pair) for low, high in runs(near[other])]
+    return joined_spans(found)
+
+
+def joined_spans(spans: list[Span]) -> list[Episode]:
+    """Spans (first frame, end, pair of bodies) as episodes: those that overlap in time and share a body are one."""
+    groups: list[tuple[int, int, set, set]] = []
+    for first, end, pair in sorted(spans):
+        bodies, pairs = set(pair), {pair}
+        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # what is joined meets more
+            groups = [g for g in groups if not any(g is other for other in met)]
+            for low, high, others, theirs in met:
+                first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs
+        groups.append((first, end, bodies, pairs))
+    whole = [Episode(tuple(sorted(bodies)), first, end, tuple(sorted(pairs))) for first, end, bodies, pairs in groups]
+    return sorted(whole, key=lambda episode: (episode.first, episode.bodies))
+
+
+def meetings(spans: list[Span], met: list[Span]) -> list[Episode]:
+    """These spans as episodes, together with all who meet their bodies at the same time by the spans `met`, and in turn
+    those: nobody is pushed into somebody who is not looked at."""
+    spans = list(spans)
+    while True:
+        found = joined_spans(spans)
+        more = [
+            (max(first, one.first), min(end, one.end), pair)
+            for one in found
+            for first, end, pair in met
+            if first < one.end and one.first < end and set(pair) & set(one.bodies) and pair not in one.pairs
+        ]
+        if not more:
+            return found
+        spans += more
 
 
 def _pushed(episode: Episode, places: np.ndarray, firm: np.ndarray, distance: float, fps: float) -> np.ndarray:

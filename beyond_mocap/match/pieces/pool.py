@@ -237,16 +237,13 @@ class _Processes:
     def check(self, moved: bool) -> None:
         """Processes here need no looking after: the executor tells when one ends."""
 
-    def renew(self) -> None:
-        """Other processes, where one has ended."""
-        self._end()
-
     def close(self, going: Iterable[Future]) -> None:
         """Ends the processes where they still work on something; else they wait for the next stage."""
         if any(not future.done() for future in going):
-            self._end()
+            self.renew()
 
-    def _end(self) -> None:
+    def renew(self) -> None:
+        """Ends the processes, where one has ended; the next piece starts others."""
         executor, self._executor = self._executor, None
         if executor is not None:
             executor.shutdown(wait=True, kill_workers=True)  # type: ignore[call-arg]  # loky's own
@@ -286,8 +283,7 @@ class _Cluster:
     def room(self) -> int:
         """Pieces that may be in hand at once; workers may come and go."""
         if time.monotonic() - self._looked > 1.0:
-            self._looked, threads = time.monotonic(), self._threads()
-            self._room = AHEAD * max(threads, 1)
+            self._looked, self._room = time.monotonic(), AHEAD * max(self._threads(), 1)
         return self._room
 
     def submit(self, work: Work, arguments: tuple) -> Future:
@@ -327,10 +323,8 @@ def _cluster(address: str) -> Iterator[object]:
     try:
         from distributed import Client
     except ImportError as error:
-        raise InputError(
-            "--scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
-            "pip install 'beyond-mocap[cluster]'",
-        ) from None
+        raise InputError("--scheduler", f"Dask cannot be imported ({error})", "dask and distributed",
+                         "pip install 'beyond-mocap[cluster]'") from None  # fmt: skip
     for name in [one for one in logging.root.manager.loggerDict if one.split(".")[0] == "distributed"]:
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)  # what is wrong is told here, in one line
     try:

@@ -16,23 +16,16 @@ from ...files.tables import plain
 from ...files.whole import atomic_write
 from ...library.library import Library
 from ...motion.track.ball_path import BallPath
-from ..crowd.correction import joined
-from ..crowd.crowd_window import BEYOND, LONGEST, REACH, CrowdPart, cut_edit, in_turn
-from ..crowd.kept_crowd import keep_parts, kept_parts
+from ..crowd.crowd_window import BEYOND, LONGEST, CrowdPart, cut_edit, join_windows, keep_parts, kept_parts
 from ..folder import MatchFolder
-from ..order import FORM, MatchOrder
+from ..order import FORM, MatchOrder, digest_of
 from ..parts import Part
-from ..player_edit import PlayerEdit
+from ..player_edit import PlayerEdit, write_player
 from ..state import MatchState
-from ..take_npz import write_player
-from .content_digest import digest_of
-from .kept_pieces import keep_piece, kept_piece
 from .pool import Failed, Workplace, run
-from .searched import Piece
-from .splice import spliced
 from .units import units_of
-from .work import Finish, finish_player, part_crowd, search_unit
-from .workplace_library import LibrarySource
+from .windows import Piece, keep_piece, kept_piece, spliced
+from .work import Finish, LibrarySource, finish_player, part_crowd, search_unit
 
 SEARCH, CROWD = "search", "crowd"
 """The kinds of pieces that are kept."""
@@ -53,10 +46,6 @@ class Job:
     place: Workplace
     report: Report
     cancelled: Callable[[], bool] | None = None
-
-    def told(self, report: Report) -> Job:
-        """The same, telling another."""
-        return replace(self, report=report)
 
     def named(self, *values: object) -> str:
         """The name of a piece of work that depends on the library and on `values`."""
@@ -84,7 +73,8 @@ class _Search:
         self._count = 0
         order = job.order
         for player, part in self._parts.items():
-            units = sum(len(units_of(_bare(plan), 0, order.window, order.overlap)) for plan in part.plans)
+            bare = (replace(plan, timeline=Timeline(), solved=None, solve_touches=False) for plan in part.plans)
+            units = sum(len(units_of(plan, 0, order.window, order.overlap)) for plan in bare)  # of the track alone
             job.state.players[player]["units"] = units
             self._count += units
 
@@ -145,11 +135,6 @@ class _Search:
         return self._job.state.players[player]["status"] == "failed"
 
 
-def _bare(plan):
-    """The plan for counting its windows: they depend on its track alone."""
-    return replace(plan, timeline=Timeline(), solved=None, solve_touches=False)
-
-
 def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]) -> dict[str, CrowdPart]:
     """What the whole span says of each player, by id: windows of everybody on the match's clock."""
     players, names = list(edits), {}
@@ -177,7 +162,7 @@ def keep_apart(job: Job, edits: dict[str, PlayerEdit], span: tuple[float, float]
         job.report(len(found) / len(windows), f"Keeping bodies apart: {len(found)} of {len(windows)} windows")
     job.folder.forget(CROWD, names.values())
     rows = [(found[number], windows[number]) for number in sorted(found)]
-    return {player: _whole([(parts[place], window) for parts, window in rows], job.order.fps)
+    return {player: join_windows([(parts[place], window) for parts, window in rows], job.order.fps)
             for place, player in enumerate(players)}  # fmt: skip
 
 
@@ -190,23 +175,8 @@ def _windows(span: tuple[float, float], window: float, fps: float) -> list[tuple
 
 def _unnamed(edits: Sequence[PlayerEdit]) -> tuple:
     """Edit lists without the library's place, on which their motion does not depend."""
-    def bare(stretch):
-        return replace(stretch, plan=replace(stretch.plan, library=""))
-
-    return tuple(replace(edit, stretches=tuple(map(bare, edit.stretches))) for edit in edits)
-
-
-def _whole(parts: Sequence[tuple[CrowdPart, tuple[float, float]]], fps: float) -> CrowdPart:
-    """One player's windows as one."""
-    if not parts:
-        none = np.zeros(0)
-        return CrowdPart(correction=in_turn([], fps), frames=none.astype(int), depth=none, before=0.0,
-                         led_frames=none.astype(int), led=np.zeros((0, 3)))
-    cores = [(one.correction, round(start * fps), round(end * fps)) for one, (start, end) in parts]
-    only = [one for one, _ in parts]
-    arrays = {name: np.concatenate([getattr(one, name) for one in only])
-              for name in ("frames", "depth", "led_frames", "led")}  # fmt: skip
-    return CrowdPart(correction=joined(cores, round(REACH * fps)), before=max(one.before for one in only), **arrays)
+    bare = [[replace(one, plan=replace(one.plan, library="")) for one in edit.stretches] for edit in edits]
+    return tuple(replace(edit, stretches=tuple(stretches)) for edit, stretches in zip(edits, bare))
 
 
 def finish(

@@ -1,27 +1,76 @@
 """The three kinds of work that a match is made of, as functions that any process can be given: each takes all that it
-needs, but the library, which a worker reads by itself."""
+needs, but the library, which a worker reads by itself, once, and the same one everywhere. The last one makes a player's
+files: with the figures of every report over all stretches, and second by second."""
 
 from __future__ import annotations
 
 import tempfile
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from ...base.errors import InputError
+from ...evaluation.report import evaluate, rounded
 from ...files.bvh import bvh
+from ...library.build import build
+from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
 from ...synthesis.provenance import Provenance, provenance_of, write_provenance
+from ...synthesis.quality import feet, root
+from ...synthesis.quality.played import Played, played_from_take
 from ...synthesis.take import Take
 from ..crowd.crowd_window import CrowdPart, crowd_window
 from ..player_edit import PlayerEdit
-from ..report.figures import player_report
 from ..shown import shown
-from .searched import Piece, searched
 from .units import Unit
-from .workplace_library import LibrarySource, library_of
+from .windows import Piece, searched
+
+_MOST, _LEAST, _SUMMED = {"max", "support_max"}, {"min"}, {"frames", "duration_s"}
+
+
+@dataclass(frozen=True)
+class LibrarySource:
+    """Where a library is, and which one it is. folder, cache, skeleton, unit: as `build` has them. key: of its content
+    and of what it is read with (`Library.kept`); "" where it is not known yet."""
+
+    folder: Path
+    cache: Path | None = None
+    skeleton: Path | None = None
+    unit: float | None = None
+    seed: int = 0
+    key: str = ""
+
+
+_lock = threading.RLock()
+_held: dict[LibrarySource, Library] = {}
+
+
+def library_of(source: LibrarySource) -> Library:
+    """The library, from memory where this process has read it before; it holds one at a time.
+
+    InputError where what is found there is not the library that the work was ordered with: recordings have been
+    changed, or this machine computes with another numpy, so that results would differ.
+    """
+    with _lock:  # several threads of one worker ask at once
+        if source not in _held:
+            built = build(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
+                          seed=source.seed)
+            if source.key and built.kept[1] != source.key:
+                raise InputError(source.folder, "another library than the one this work was ordered with",
+                                 "the same recordings and the same numpy for all workers", "start the command again")
+            hold(source, built)
+        return _held[source]
+
+
+def hold(source: LibrarySource, library: Library) -> None:
+    """Lets work in this process use a library that is read already."""
+    with _lock:
+        _held.clear()
+        _held[source] = library
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +101,7 @@ def search_unit(source: LibrarySource, unit: Unit) -> Piece:
     return searched(library_of(source), unit)
 
 
-def part_crowd(
-    source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float
-) -> tuple[CrowdPart, ...]:
+def part_crowd(source: LibrarySource, edits: Sequence[PlayerEdit], start: float, end: float) -> tuple[CrowdPart, ...]:
     """Keeps everybody apart in one window."""
     return crowd_window(library_of(source), edits, start, end)
 
@@ -68,18 +115,71 @@ def finish_player(source: LibrarySource, order: Finish) -> PlayerFiles:
         plans = [stretch.plan for stretch in order.edit.stretches]
         span = float(plans[0].track.times[0]), float(plans[-1].track.times[-1])
         takes = shown(library, order.edit, order.ball, *span)
-        files = {}
-        report = None
+        files, report = {}, None
         if order.figures:
             overlap = [_overlap(take, order) for take in takes]
             report = player_report(library, takes, order.measured, overlap, order.ball)
-            table = in_turn([provenance_of(take) for take in takes])
+            table = _join_provenance([provenance_of(take) for take in takes])
             files["provenance.csv"] = _written(lambda path: write_provenance(path, table))
         if order.bvh:
             for number, take in enumerate(takes, 1):
                 ending = "bvh" if number == 1 else f"{number}.bvh"
                 files[ending] = _written(lambda path, take=take: bvh.write(path, take.motion))
     return PlayerFiles(report, files)
+
+
+def player_report(
+    library: Library, takes: Sequence[Take], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
+) -> dict:
+    """The figures of a player with one take, one measured track and the overlap (T,) m with others' bodies for each
+    stretch in which he is there; in the form of the contract's Report JSON, with `time_lost_s` and `per_second` beside.
+
+    ball: the match's, as written out. InputError where a take has another skeleton than the library.
+    """
+    reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
+    out = combined(reports, [len(take.motion) for take in takes])
+    out["time_lost_s"] = time_lost(out["warning_seconds"])
+    out["per_second"] = per_second([played_from_take(take) for take in takes], tracks, overlap, ball)
+    return rounded(out)
+
+
+def combined(reports: Sequence[dict], weights: Sequence[float]) -> dict:
+    """One report for several stretches: means, shares and percentiles weighted by `weights`, largest and least values
+    the largest and least, numbers of frames and seconds summed, lists one behind the other; what only some know is
+    theirs."""
+    if len(reports) == 1:
+        return dict(reports[0])
+    return {name: _joined(name, [one.get(name) for one in reports], weights) for name in reports[0]}
+
+
+def time_lost(warning_seconds: Sequence[Sequence[Sequence[float]]]) -> float:
+    """Seconds in which something gave way: what the warnings are about, each second once."""
+    spans = sorted((first, last) for line in warning_seconds for first, last in line)
+    lost, until = 0.0, -np.inf
+    for first, last in spans:
+        lost += max(0.0, last - max(first, until))
+        until = max(until, last)
+    return lost
+
+
+def per_second(
+    played: Sequence[Played], tracks: Sequence[Track], overlap: Sequence[np.ndarray], ball: BallPath
+) -> dict:
+    """Whole seconds of the match's clock from `start_s` on, None where he is away: `root_error_m` (mean), `skate_cm_s`
+    (mean over feet that stand), `overlap_m` (deepest), `ball_m` (nearest distance of his hips from the ball, on the
+    ground)."""
+    start = int(np.floor(min(one.start_time for one in played) + 1e-6))
+    end = int(np.floor(max(one.times[-1] for one in played) + 1e-6)) + 1
+    names = ("root_error_m", "skate_cm_s", "overlap_m", "ball_m")
+    rows: dict[str, list] = {name: [None] * (end - start) for name in names}
+    for one, track, deep in zip(played, tracks, overlap):
+        second = np.floor(one.times + 1e-6).astype(int) - start
+        for name, values, over in _curves(one, track, deep, ball):
+            for number in np.unique(second):
+                found = values[second == number]
+                found = found[np.isfinite(found)]
+                rows[name][number] = float(over(found)) if len(found) else None
+    return {"start_s": start, **rows}
 
 
 def _overlap(take: Take, order: Finish) -> np.ndarray:
@@ -91,16 +191,12 @@ def _overlap(take: Take, order: Finish) -> np.ndarray:
     return out
 
 
-def in_turn(tables: Sequence[Provenance]) -> Provenance:
+def _join_provenance(tables: Sequence[Provenance]) -> Provenance:
     """The provenance of several stretches, one behind the other."""
-    return Provenance(
-        times=np.concatenate([one.times for one in tables]),
-        clip=tuple(clip for one in tables for clip in one.clip),
-        clip_frame=np.concatenate([one.clip_frame for one in tables]),
-        mirrored=np.concatenate([one.mirrored for one in tables]),
-        words=tuple(words for one in tables for words in one.words),
-        contacts=np.concatenate([one.contacts for one in tables]),
-    )
+    arrays = {name: np.concatenate([getattr(one, name) for one in tables])
+              for name in ("times", "clip_frame", "mirrored", "contacts")}  # fmt: skip
+    return Provenance(clip=tuple(clip for one in tables for clip in one.clip),
+                      words=tuple(words for one in tables for words in one.words), **arrays)
 
 
 def _written(write) -> bytes:
@@ -109,3 +205,38 @@ def _written(write) -> bytes:
         path = Path(folder) / "content"
         write(path)
         return path.read_bytes()
+
+
+def _joined(name: str, values: list, weights: Sequence[float]):
+    known = [(value, weight) for value, weight in zip(values, weights) if value is not None]
+    if not known:
+        return None
+    first = known[0][0]
+    if isinstance(first, dict):
+        kept = [weight for _, weight in known]
+        return {key: _joined(key, [value.get(key) for value, _ in known], kept) for key in first}
+    if isinstance(first, list):
+        return [entry for value, _ in known for entry in value]
+    if isinstance(first, (bool, str)) or name in ("version", "seed", "fps"):
+        return first
+    numbers = np.array([value for value, _ in known], dtype=float)
+    if name in _MOST or name in _LEAST or name in _SUMMED:
+        done = numbers.max() if name in _MOST else numbers.min() if name in _LEAST else numbers.sum()
+    else:
+        done = np.average(numbers, weights=[weight for _, weight in known])
+    return int(done) if isinstance(first, int) and name in _SUMMED else float(done)
+
+
+def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):
+    """(name, values (T,) or (T, 2), what stands for a second of them)."""
+    wanted = root.track_at(track, played.times)
+    skate = np.full((len(played.motion), 2), np.nan)
+    skate[1:] = 100.0 * feet.contact_speeds(played.feet, played.contacts, played.motion.fps)
+    place = [np.interp(played.times, ball.times, ball.positions[:, axis], np.nan, np.nan) for axis in (0, 1)]
+    away = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
+    return (
+        ("root_error_m", root.root_error(played.pelvis, wanted, played.motion.fps), np.mean),
+        ("skate_cm_s", skate, np.mean),
+        ("overlap_m", np.asarray(overlap, dtype=float), np.max),
+        ("ball_m", away, np.min),
+    )

@@ -14,7 +14,7 @@ SMALL = {"engine": "CYCLES", "width": 48, "height": 28, "fps": 10, "samples": 1}
 @pytest.fixture
 def study(core, tmp_path):
     """A folder with a study: two systems show the same motion, one of them four metres away; training is movies."""
-    order, files, bvh = core("study.order"), core("study.study_file"), core("files.bvh.bvh")
+    order, files, bvh = core("study.order"), core("study.order"), core("files.bvh.bvh")
     here = made.motion(core, 7)
     there = core("motion.motion").Motion(here.skeleton, here.root_positions + [4.0, 2.0, 0.0], here.rotations, here.fps)
     bvh.write(tmp_path / "a.bvh", here)

@@ -7,8 +7,8 @@ import pytest
 
 from beyond_mocap.annotation import KeyMoment, Timeline
 from beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
+from beyond_mocap.evaluation.reference import View
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.evaluation.view import View
 from beyond_mocap.synthesis.quality.played import played_from_take
 
 

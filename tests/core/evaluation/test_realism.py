@@ -87,5 +87,5 @@ def test_smoothness_peaks_at_a_cut():
 
 def test_smoothness_is_real_at_its_speed():
     curve = np.concatenate([np.linspace(0.0, 1.0, 101), [np.nan], np.linspace(2.0, 3.0, 101)])
-    real = realism.smoothness_p95(curve, np.repeat([0.5, 0.5, 3.5], [101, 1, 101]))
+    real = realism.real_p95(curve, np.repeat([0.5, 0.5, 3.5], [101, 1, 101]))
     assert real == pytest.approx([0.95, 0.95, 2.95, 2.95, 2.95])

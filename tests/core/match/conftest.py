@@ -14,9 +14,8 @@ from beyond_mocap.annotation import parse_timeline
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.pieces import pool
-from beyond_mocap.match.pieces.searched import Piece, searched
-from beyond_mocap.match.pieces.splice import spliced
 from beyond_mocap.match.pieces.units import units_of
+from beyond_mocap.match.pieces.windows import Piece, searched, spliced
 from beyond_mocap.match.player_edit import PlayerEdit
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan

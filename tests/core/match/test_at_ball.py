@@ -9,9 +9,9 @@ from beyond_mocap.annotation.ball_contact import contact_gap, surfaces
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.library.build import build
 from beyond_mocap.match.crowd.correction import CURVES, FEET, ROOT, Correction
-from beyond_mocap.match.crowd.restore_ball_contact import OPEN, at_ball
+from beyond_mocap.match.match_ball import OPEN, at_ball
+from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.match.shown import shown
-from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.motion.motion import pose_kinematics
 from tests.core.match.small_match import LIBRARY, SECONDS
 

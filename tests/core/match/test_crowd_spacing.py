@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.crowd.attention import looking
-from beyond_mocap.match.crowd.capsules import nearest, overlap, touching
+from beyond_mocap.match.crowd.capsules import nearest, touching
 from beyond_mocap.match.crowd.correction import ARMS, CURVES, FEET, ROOT, Correction, applied, carried, joined
-from beyond_mocap.match.crowd.episodes import episodes, joined_spans, meetings
-from beyond_mocap.match.crowd.spacing import DISTANCE, STEADY, keeping, spaced
+from beyond_mocap.match.crowd.crowd import overlap_depths
+from beyond_mocap.match.crowd.spacing import DISTANCE, STEADY, episodes, joined_spans, keeping, meetings, spaced
+from beyond_mocap.match.shown import looking
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics, place
@@ -59,8 +59,9 @@ def test_touching_tells_how_deep_and_which_way():
 
 def test_overlap_of_bodies_side_by_side(walk):
     """The same walk beside itself: hands and shoulders meet first, and it is deeper the nearer they are."""
-    depth = [overlap(walk, place(walk, offset=(0.0, away, 0.0))).max() for away in (0.2, 0.4, 0.9)]
-    assert depth[0] > depth[1] > 0.0 > depth[2]
+    others = [place(walk, offset=(0.0, away, 0.0)) for away in (0.2, 0.4, 0.9)]
+    depth = [overlap_depths([walk, other], [0, 0])[0].max() for other in others]
+    assert depth[0] > depth[1] > depth[2] == 0.0
 
 
 def test_episodes_join_what_overlaps_and_shares_a_body():

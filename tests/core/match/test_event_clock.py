@@ -7,7 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.events.event_data import MatchEvent, MatchEvents
-from beyond_mocap.match.labels.event_clock import aligned
+from beyond_mocap.match.event_clock import aligned
 from beyond_mocap.motion.track.match_data import Half
 
 HALVES = (Half(1, 0.0, 0.0, 900.0), Half(2, 910.0, 910.0, 1810.0))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.evaluation.report import evaluate
-from beyond_mocap.match.report.figures import combined, per_second, player_report, time_lost
+from beyond_mocap.match.pieces.work import combined, per_second, player_report, time_lost
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.quality.played import played_from_take
 

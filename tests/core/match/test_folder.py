@@ -11,8 +11,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.folder import file_names, opened, read_state
-from beyond_mocap.match.order import MatchOrder, identity
-from beyond_mocap.match.pieces.content_digest import digest_of
+from beyond_mocap.match.order import MatchOrder, digest_of, identity
 
 TOP = Path(__file__).resolve().parents[3]
 

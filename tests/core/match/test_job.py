@@ -19,8 +19,8 @@ from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.library.build import build
 from beyond_mocap.match.folder import read_state
 from beyond_mocap.match.make import make_match
+from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.match.shown import shown
-from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.synthesis.provenance import read_provenance
 from tests.core.cli.test_command_line import assert_contract

@@ -7,10 +7,9 @@ import pytest
 
 from beyond_mocap.base.errors import TimedLine, spans_of
 from beyond_mocap.match.crowd.correction import Correction
-from beyond_mocap.match.crowd.crowd_window import CrowdPart
-from beyond_mocap.match.crowd.kept_crowd import keep_parts, kept_parts
-from beyond_mocap.match.pieces.content_digest import digest_of
-from beyond_mocap.match.pieces.kept_pieces import keep_piece, kept_piece
+from beyond_mocap.match.crowd.crowd_window import CrowdPart, keep_parts, kept_parts
+from beyond_mocap.match.order import digest_of
+from beyond_mocap.match.pieces.windows import keep_piece, kept_piece
 
 
 @pytest.fixture

@@ -11,9 +11,8 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.report.page import page
-from beyond_mocap.match.report.results import read_match_results
-from beyond_mocap.match.report.strips import colours, heat_strip
-from beyond_mocap.match.report.worst import LIMITS, worst_seconds
+from beyond_mocap.match.report.pictures import colours, heat_strip
+from beyond_mocap.match.report.results import LIMITS, read_match_results, worst_seconds
 
 SECONDS, FIRST = 60, 100.0
 

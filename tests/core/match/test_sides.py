@@ -6,9 +6,7 @@ import pytest
 from beyond_mocap.match.crowd.capsules import Capsule, touching
 from beyond_mocap.match.crowd.correction import CURVES, ROOT
 from beyond_mocap.match.crowd.crowd_body import CrowdBody, moved
-from beyond_mocap.match.crowd.pressure import MOST, STEP, Pressure, pressed
-from beyond_mocap.match.crowd.pushing import pushed
-from beyond_mocap.match.crowd.sides import sides, way_out
+from beyond_mocap.match.crowd.pushing import MOST_PRESSURE, PRESSURE_STEP, Pressure, pressed, pushed, sides, way_out
 
 FPS, RADIUS = 30.0, 0.1
 
@@ -69,12 +67,12 @@ def test_pressure_grows_while_distance_lacks_and_falls_where_there_is_room():
     pressure, keys, side = Pressure(), np.array([7, 3]), np.tile([0.0, 0.0, 1.0], (2, 1))
     before, _ = pressure.pushes(keys)
     now = pressed(before, np.array([0.1, -0.1]))
-    assert now == pytest.approx([0.1 * STEP, 0.0])
+    assert now == pytest.approx([0.1 * PRESSURE_STEP, 0.0])
     pressure.keep(keys, now, side, (0, 10))
     before, towards = pressure.pushes(np.array([3, 5, 7]))
-    assert before == pytest.approx([0.0, 0.0, 0.1 * STEP]) and towards[2, 2] == 1.0
-    assert pressed(before[2:], np.array([-0.05])) == pytest.approx([0.05 * STEP])
-    assert pressed(before[2:], np.array([1e3])) == [MOST]
+    assert before == pytest.approx([0.0, 0.0, 0.1 * PRESSURE_STEP]) and towards[2, 2] == 1.0
+    assert pressed(before[2:], np.array([-0.05])) == pytest.approx([0.05 * PRESSURE_STEP])
+    assert pressed(before[2:], np.array([1e3])) == [MOST_PRESSURE]
 
 
 def test_contacts_outside_a_span_keep_their_pressure():

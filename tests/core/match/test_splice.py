@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.pieces.library_clips import bound, named
-from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey, chained, part, retabled, table
-from beyond_mocap.match.pieces.splice import spliced
+from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey, bound, chained, named, part, retabled, table
 from beyond_mocap.match.pieces.units import units_of
+from beyond_mocap.match.pieces.windows import spliced
 from beyond_mocap.synthesis.search.edit_list import find_seams
 from beyond_mocap.synthesis.synthesize import synthesize
 

@@ -13,8 +13,7 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.crowd.correction import CURVES, Correction
 from beyond_mocap.match.pieces.named_edit import NamedEdit, NamedKey
-from beyond_mocap.match.player_edit import PlayerEdit, Stretch, kept
-from beyond_mocap.match.take_npz import read_player, write_player
+from beyond_mocap.match.player_edit import PlayerEdit, Stretch, kept, read_player, write_player
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Pin, Plan, SolvedCourse, Touched
 

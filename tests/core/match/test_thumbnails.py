@@ -9,9 +9,9 @@ from beyond_mocap.appearance.picture import pose_picture
 from beyond_mocap.library.build import build
 from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
-from beyond_mocap.match.report.thumbnails import SIZE, thumbnails
+from beyond_mocap.match.player_edit import read_player
+from beyond_mocap.match.report.pictures import SIZE, thumbnails
 from beyond_mocap.match.shown import shown
-from beyond_mocap.match.take_npz import read_player
 
 SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend"
 

@@ -9,9 +9,8 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import KeyMoment, Span, Timeline
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.match.pieces.cut_plan import cut_plan, cut_track
-from beyond_mocap.match.pieces.searched import searched
-from beyond_mocap.match.pieces.units import frame_count, layout_edges, units_of, window_edges
+from beyond_mocap.match.pieces.units import cut_plan, cut_track, frame_count, units_of, window_edges
+from beyond_mocap.match.pieces.windows import searched
 from beyond_mocap.match.player_edit import kept
 from beyond_mocap.motion.track import Track, sample
 from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
@@ -29,7 +28,7 @@ def test_windows_follow_each_other_and_lie_on_the_clock(begin, count, window):
 
 
 def test_a_part_of_a_stretch_is_laid_out_in_the_windows_of_the_whole():
-    whole, part = layout_edges(5.0, 6000, 30.0, 30.0), layout_edges(65.0, 1800, 30.0, 30.0)
+    whole, part = window_edges(5.0, 6000, 30.0, step=1), window_edges(65.0, 1800, 30.0, step=1)
     assert {edge + 1800 for edge in part[1:-1]} <= set(whole)
 
 

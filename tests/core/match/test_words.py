@@ -10,7 +10,7 @@ from beyond_mocap.annotation.event_words import TABLE, read_event_words
 from beyond_mocap.ball.solve_ball import solve_ball
 from beyond_mocap.ball.tracked.solve import SolvedTouch
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.match.labels.words import (  # fmt: skip
+from beyond_mocap.match.words import (
     LEAST_CONFIDENCE,
     NEAREST,
     TOUCHES,
@@ -18,11 +18,13 @@ from beyond_mocap.match.labels.words import (  # fmt: skip
     Moment,
     apart,
     dribbles,
+    edited,
     moment_of,
+    read_words,
     timeline_of,
     words_of,
+    write_words,
 )
-from beyond_mocap.match.labels.words_text import edited, read_words, write_words
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
 from beyond_mocap.synthetic.ground_truth.planted import planted_match
 from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
@@ -95,7 +97,7 @@ def test_most_planted_touches_come_back_as_words_of_their_player(planted):
         m.source == TOUCHES and LEAST_CONFIDENCE <= m.confidence <= 1.0 for ms in words.players.values() for m in ms
     )
     for player in match.players:
-        validate(words.timeline(player.id), start=0.0, end=40.0)
+        validate(timeline_of(words.players[player.id]), start=0.0, end=40.0)
 
 
 def test_without_a_ball_nobody_has_words(planted):

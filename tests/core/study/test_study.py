@@ -12,17 +12,19 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.study.analysis import analysed, cliffs_delta, holm, welch
 from beyond_mocap.study.answers import read_answers
-from beyond_mocap.study.bars import rows_of
 from beyond_mocap.study.form import form_page, form_table, questions_of
-from beyond_mocap.study.order import Clip, ordered
-from beyond_mocap.study.page import study_page
-from beyond_mocap.study.study_file import read_study, write_study
+from beyond_mocap.study.order import Clip, ordered, read_study, write_study
+from beyond_mocap.study.page import place_bar, study_page
 
 SYSTEMS, SCENARIOS = ("ours", "skating", "theirs"), ("s1", "s2", "s3", "s4", "s5")
 CLIPS = (
     Clip("good.mp4", "training", ""), Clip("bad.mp4", "training", ""),
     *(Clip(f"{system}/{scenario}.mp4", system, scenario) for scenario in SCENARIOS for system in SYSTEMS),
 )  # fmt: skip
+
+
+def clip_of(study, name):
+    return next(clip for clip in study.clips if clip.name == name)
 
 
 def planted(folder, study, shifts, seed=1, skip=()):
@@ -33,7 +35,7 @@ def planted(folder, study, shifts, seed=1, skip=()):
         taste = rng.normal(3.0, 0.4)
         lines = ["study,rater,question,answer", f"{study.id},{rater},age,25-34", f"{study.id},{rater},characters,daily"]
         for (name,) in study.orders[rater]:
-            shift = shifts.get(study.clip(name).system, 0.0)
+            shift = shifts.get(clip_of(study, name).system, 0.0)
             mark = int(np.clip(round(taste + shift + rng.normal(0.0, 0.7)), 1, 5))
             if name not in skip:
                 lines.append(f"{study.id},{rater},{name},{mark}")
@@ -64,7 +66,7 @@ def test_no_system_has_a_better_place_in_the_order():
     places = {system: [] for system in SYSTEMS}
     for order in study.orders.values():
         for place, (name,) in enumerate(order[2:]):
-            places[study.clip(name).system].append(place)
+            places[clip_of(study, name).system].append(place)
     for values in places.values():  # mean of 15 places is 7, of 2000 draws to within 4 standard errors
         assert abs(np.mean(values) - 7.0) < 4.0 * 4.32 / np.sqrt(2000)
 
@@ -76,7 +78,7 @@ def test_pairs_are_of_one_scenario_and_each_comes_once_either_way_round():
         assert set(order[0]) == set(study.training) and len(order) == 1 + 15
         assert len({frozenset(shown) for shown in order}) == 16
         for shown in order[1:]:
-            first, second = map(study.clip, shown)
+            first, second = (clip_of(study, name) for name in shown)
             assert first.scenario == second.scenario and first.system != second.system
             left += SYSTEMS.index(first.system) < SYSTEMS.index(second.system)
     assert abs(left - 300) < 60
@@ -217,7 +219,7 @@ def test_missing_answers_leave_the_rest_paired(tmp_path):
     lost = next(clip.name for clip in study.clips if (clip.system, clip.scenario) == ("ours", "s1"))
     found = analysed(study, planted(tmp_path / "a", study, {"ours": 1.0}, skip=(lost,)), [("ours", "theirs")])
     given = found.answers.ratings["R01"]
-    marks = {(study.clip(name).system, study.clip(name).scenario): mark for name, mark in given.items()}
+    marks = {(clip_of(study, name).system, clip_of(study, name).scenario): mark for name, mark in given.items()}
     own = [marks["ours", s] - marks["theirs", s] for s in SCENARIOS[1:]]
     assert found.findings[0].differences[0] == pytest.approx(np.mean(own))
     assert found.answers.missing == 6 and any("6 answers" in note for note in found.notes)
@@ -237,9 +239,9 @@ def test_holm_and_cliff_by_hand():
 
 
 def test_bars_are_centred_on_the_undecided():
-    left, width = rows_of(np.array([1, 2, 4, 2, 1]))
+    left, width = place_bar(np.array([1, 2, 4, 2, 1]))
     assert left == pytest.approx([-50.0, -40.0, -20.0, 20.0, 40.0]) and width.sum() == pytest.approx(100.0)
-    left, width = rows_of(np.array([0, 0, 0, 3, 1]))
+    left, width = place_bar(np.array([0, 0, 0, 3, 1]))
     assert left[3] == 0.0 and left[4] + width[4] == pytest.approx(100.0)
 
 
@@ -249,7 +251,7 @@ def test_pairs_are_analysed_by_who_was_chosen(tmp_path):
     lines = ["study,rater,question,answer"]
     for rater, order in study.orders.items():
         for shown in filter(study.counts, order):
-            by = {study.clip(name).system: name for name in shown}
+            by = {clip_of(study, name).system: name for name in shown}
             likes = by.get("ours") if rng.random() < 0.8 and "ours" in by else shown[rng.integers(2)]
             lines.append(f"{study.id},{rater},{'/'.join(shown)},{likes if rng.random() < 0.9 else 'same'}")
     (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", "utf-8")

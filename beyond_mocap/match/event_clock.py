@@ -17,18 +17,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...annotation.event_words import EVENT_KINDS
-from ...ball.tracked.kinds import TOUCH_KINDS
-from ...ball.tracked.solve import SolvedTouch
-from ...base.errors import InputError
-from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
-from ...motion.track.match_data import Half
+from ..annotation.event_words import EVENT_KINDS
+from ..ball.tracked.kinds import TOUCH_KINDS
+from ..ball.tracked.solve import SolvedTouch
+from ..base.errors import InputError
+from ..files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..motion.track.match_data import Half
 
 MOST_LAG = 300.0
 """Seconds by which clocks may differ: a feed whose clock begins elsewhere, if enough of its events say so."""
 
 WINDOW = 2.0
-"""Seconds from its place on the mended clock within which an event's touch is looked for."""
+"""Seconds from its place on the corrected clock within which an event's touch is looked for."""
 
 _BIN = 0.1  # s of lag that are told apart
 _SPREAD = 0.5  # s by which lags of one period scatter

@@ -1,24 +1,36 @@
 """What everybody does with the ball and when, as words: from solved touches, and from a provider's events.
 
     words = words_of(match, solve_ball(match), read_events("events.xml", match=match))
-    timeline = words.timeline("home_7", 0.0, 60.0)
+    timeline = timeline_of(words.players["home_7"], 0.0, 60.0)
+
+A player's words are kept as a text file that people may edit: the contract's form, with where each line comes from
+behind it.
+
+    # words of home_7: edit freely. A file that was edited is kept and used, another made anew [5d0c3f2a]
+    12.31 kick running low  # touches 0.93
+    20.5 23.2 dribble  # touches 0.97
 """
 
 from __future__ import annotations
 
+import os
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
-from ...annotation import KeyMoment, Span, Timeline
-from ...annotation.ball_contact import takes_with_foot
-from ...annotation.event_words import EventWords, read_event_words
-from ...ball.tracked import kinds
-from ...ball.tracked.solve import SolvedBall, SolvedTouch
-from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
-from ...motion.track.match_data import Match
+from ..annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline, read_text, validate
+from ..annotation.ball_contact import takes_with_foot
+from ..annotation.event_words import EventWords, read_event_words
+from ..ball.tracked import kinds
+from ..ball.tracked.solve import SolvedBall, SolvedTouch
+from ..base.digest import hex_digest
+from ..files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.whole import atomic_write
+from ..motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned
 
 LEAST_CONFIDENCE = 0.3
@@ -41,6 +53,7 @@ _TOLD = 0.4  # confidence in an event without a touch
 _SHOWN_BY = 0.5  # s from an event without a touch within which another moment of the player shows it
 _LIKE_EVENT = {kind.name: (kind.event, kind.details) for kind in kinds.TOUCH_KINDS}
 _DRIBBLE = next(kind for kind in kinds.TOUCH_KINDS if kind.name == kinds.DRIBBLE)
+_HEAD = re.compile(r"#.*\[([0-9a-f]{8})\]\s*")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,10 +77,6 @@ class MatchWords:
     notes: tuple[str, ...] = ()
     figures: Mapping[str, object] = field(default_factory=dict)
 
-    def timeline(self, player: str, start: float = -np.inf, end: float = np.inf) -> Timeline:
-        """One player's words between two times (s), stretches cut there."""
-        return timeline_of(self.players.get(player, ()), start, end)
-
 
 def timeline_of(moments: Iterable[Moment], start: float = -np.inf, end: float = np.inf) -> Timeline:
     """Moments between two times (s) as a timeline, stretches cut there."""
@@ -88,9 +97,9 @@ def words_of(
 
     A touch becomes a key moment with the words that the table has for it, or for the event that tells of it too; its
     time is the touch's. Touches of one player in a row are a stretch of dribble. A pass, shot or save without a touch
-    becomes a key moment at its place on the mended clock. Of two within NEAREST the surer one stays. What is not known
-    (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no better
-    than by chance.
+    becomes a key moment at its place on the corrected clock. Of two within NEAREST the surer one stays. What is not
+    known (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no
+    better than by chance.
     """
     table = table or read_event_words()
     touches = solved.touches if solved else ()
@@ -100,22 +109,50 @@ def words_of(
     heights, left_out, players = has_heights(match), Counter(), {}
     for player, path in zip(match.players, match.positions):
         own = [(i, touch) for i, touch in enumerate(touches) if touch.player == player.id]
-        found = [
-            moment_of(touch, match.times, path, heights=heights, table=table,
-                      event=onto.events[told[i]] if i in told else None)
-            for i, touch in own
-        ]
-        found = [moment for moment in found if moment]
+        found = [moment for i, touch in own if (moment := moment_of(
+            touch, match.times, path, heights, table, event=onto.events[told[i]] if i in told else None,
+        ))]  # fmt: skip
         sure = [moment for moment in found if moment.confidence >= LEAST_CONFIDENCE]
-        sure += _untouched(
-            player.id, onto, span, times=match.times, path=path, table=table, beside=found,
-        ) if onto else []
+        if onto:
+            sure += _untouched(player.id, onto, span, times=match.times, path=path, table=table, beside=found)
         kept = apart(sure)
         left_out["doubtful"] += sum(moment.confidence < LEAST_CONFIDENCE for moment in found)
         left_out["close"] += len(sure) - len(kept)
         players[player.id] = ordered([*kept, *dribbles([touch for _, touch in own])])
     notes = (*(events.notes if events else ()), *(onto.notes if onto else ()), *_notes(touches, left_out))
     return MatchWords(players, notes, _figures(onto, touches, span) if onto else {})
+
+
+def write_words(path: str | os.PathLike, player: str, moments: Iterable[Moment]) -> None:
+    """Writes one player's moments; InputError where that cannot be done."""
+    lines = [f"{_line(moment)}  # {moment.source} {moment.confidence:.2f}\n" for moment in ordered(moments)]
+    told = "edit freely. A file that was edited is kept and used, another made anew"
+    atomic_write(path, f"# words of {' '.join(player.split())}: {told} [{_digest(lines)}]\n{''.join(lines)}")
+
+
+def edited(path: str | os.PathLike) -> bool:
+    """Whether there is such a file, and a person has changed it since it was written, or written it."""
+    if not Path(path).is_file():
+        return False
+    lines = read_text(path).splitlines(keepends=True)
+    head = _HEAD.fullmatch(lines[0]) if lines else None
+    return head is None or head[1] != _digest(lines[1:])
+
+
+def read_words(
+    path: str | os.PathLike, automatic: Sequence[Moment] = (), known_words: Iterable[str] = ()
+) -> tuple[Moment, ...]:
+    """The moments in a file. automatic: lines that say what one of these says are that one; the others are the user's.
+
+    known_words: beyond the vocabulary. InputError, with the line, for what is no timeline or has unknown words.
+    """
+    timeline = parse_timeline(read_text(path), str(path))
+    validate(timeline, known_words, where=str(path))
+    known = {_line(moment): moment for moment in automatic}
+    found = [Moment(time=key.time, words=key.words, source=USER, confidence=1.0) for key in timeline.keys]
+    found += [Moment(time=span.start, words=span.words, source=USER, confidence=1.0, end=span.end)
+              for span in timeline.spans]  # fmt: skip
+    return ordered(known.get(_line(moment), moment) for moment in found)
 
 
 def _untouched(player: str, onto: AlignedEvents, span, times, path, table, beside) -> list[Moment]:
@@ -165,15 +202,18 @@ def moment_of(
     filled_in = {**seen_words(touch.time, times, path), **height_words(touch.part, touch.position[2], heights)}
     if event is None:
         words = table.words(kind, touch.part, details, filled_in)
-        return Moment(
-            time=round(touch.time, 3), words=words, source=TOUCHES, confidence=round(touch.confidence, 3),
-        ) if words else None
+        return _moment(touch, words, TOUCHES, touch.confidence)
     part, filled_in = event.part or touch.part, {**filled_in, "side": event.side}
     if part != touch.part:
         filled_in.update(height_words(part, touch.position[2], heights))
     words = table.words(event.kind, part, event.details, filled_in) or table.words(kind, part, details, filled_in)
-    sure = 1.0 - _FORGETS * (1.0 - touch.confidence)
-    return Moment(time=round(touch.time, 3), words=words, source=BOTH, confidence=round(sure, 3)) if words else None
+    return _moment(touch, words, BOTH, 1.0 - _FORGETS * (1.0 - touch.confidence))
+
+
+def _moment(touch: SolvedTouch, words: tuple[str, ...], source: str, sure: float) -> Moment | None:
+    if not words:
+        return None
+    return Moment(time=round(touch.time, 3), words=words, source=source, confidence=round(sure, 3))
 
 
 def seen_words(time: float, times: np.ndarray, path: np.ndarray) -> dict[str, str]:
@@ -221,10 +261,8 @@ def dribbles(touches: list[SolvedTouch]) -> list[Moment]:
         lasts = chain[-1].time - chain[0].time
         if lasts >= _SHORTEST and any(touch.kind == kinds.DRIBBLE for touch in chain):
             sure = float(np.mean([touch.confidence for touch in chain]))
-            out.append(
-                Moment(time=round(chain[0].time, 3), words=_DRIBBLE.labels, source=TOUCHES, confidence=round(sure, 3),
-                       end=round(chain[-1].time, 3))
-            )
+            out.append(Moment(time=round(chain[0].time, 3), words=_DRIBBLE.labels, source=TOUCHES,
+                              confidence=round(sure, 3), end=round(chain[-1].time, 3)))
     return out
 
 
@@ -241,3 +279,14 @@ def _notes(touches, left_out: Counter) -> list[str]:
         (left_out["close"], f"touches within {NEAREST:g} s of a surer one of the same player make no key moment"),
     ]
     return [f"{count} {what}" for count, what in told if count]
+
+
+def _line(moment: Moment) -> str:
+    """The contract's line for a moment."""
+    return format_timeline(timeline_of([moment])).rstrip("\n")
+
+
+def _digest(lines: Iterable[str]) -> str:
+    """Of what lines say, however they end."""
+    said = "\n".join(line.rstrip() for line in lines if line.strip())
+    return hex_digest(said, digits=8)

@@ -1,11 +1,21 @@
-"""A player's whole match as one strip: how bad it is from left to right, as a PNG that needs no library to draw."""
+"""Pictures of the page over a match: how bad it is for a player from left to right, as a strip that needs no library to
+draw, and players at a second."""
 
 from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
 
 import numpy as np
+
+from ...appearance.picture import pose_picture
+from ...base.errors import BeyondMocapError
+from ...library.library import Library
+from ..folder import read_state
+from ..player_edit import read_player
+from ..shown import shown
 
 CELLS = 900
 """Most cells of a strip; where a match has more seconds, each cell shows the worst of its own."""
@@ -13,6 +23,8 @@ FULL = 3.0
 """Times the limit at which the colour is at its end."""
 _GOOD, _LIMIT, _BAD = np.array([[226, 240, 229], [250, 205, 110], [170, 20, 20]], float)
 _NOBODY = np.array([236, 236, 236], float)
+SIZE = 224
+"""Pixels of a side of a player's picture."""
 
 
 def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height: int = 1) -> bytes:
@@ -26,6 +38,22 @@ def heat_strip(bad: np.ndarray, start: float, span: tuple[float, float], height:
     cells = min(count, CELLS)
     edges = np.linspace(0, count, cells + 1).astype(int)[:-1]
     return png(np.repeat(colours(np.fmax.reduceat(whole, edges))[None], height, axis=0))
+
+
+def thumbnails(library: Library, folder: Path) -> Callable[[str, float], np.ndarray | None]:
+    """What draws a player at a second of the match: (SIZE, SIZE, 4) as `pose_picture` does, None where he has no motion
+    then or his edit list cannot be read. InputError where the folder has no match.json."""
+    files: Mapping[str, str] = {row["id"]: str(row.get("file", row["id"])) for row in read_state(folder)["players"]}
+
+    def drawn(player: str, second: float) -> np.ndarray | None:
+        path = folder / f"{files[player]}.take.npz"
+        try:
+            takes = shown(library, read_player(path), None, second, second + 1.0)
+            return pose_picture(takes[0].motion, 0, SIZE) if takes else None
+        except BeyondMocapError:
+            return None
+
+    return drawn
 
 
 def colours(bad: np.ndarray) -> np.ndarray:

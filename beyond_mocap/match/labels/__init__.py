@@ -1,1 +1,0 @@
-"""What players do and when, from events and solved touches, on the tracking's clock."""

@@ -1,0 +1,201 @@
+"""What the search finds for one window, no motion yet, only which clip is shown when: found, kept in a file until it is
+needed again (never pickled), and joined into one edit list.
+
+Windows are cut where two neighbours show the same frame of the same clip, so that it cannot be told where one ends;
+else at the cheapest transition that the overlap has.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ...base.errors import InputError, TimedLine, spans_of
+from ...files.whole import atomic_write
+from ...library.chosen import with_chosen_gaits
+from ...library.features import FPS
+from ...library.library import Library
+from ...synthesis.plan import Plan
+from ...synthesis.resolve_plan import resolve_plan
+from ...synthesis.search.distance import exact_keys
+from ...synthesis.search.path_costs import PathCosts, balanced
+from ...synthesis.search.path_search import PathSearch
+from ...synthesis.search.slots import AROUND
+from ...synthesis.search.wanted import build_order
+from ..player_edit import LAYOUT, PlayerEdit, Stretch, kept
+from .named_edit import CONTINUES, NamedEdit, NamedKey, bound, chained, named, part, retabled, table
+from .units import Unit, cut_plan
+
+_ARRAYS = ("clip", "first", "rate", "length", "cut")
+_PLAIN = ("player", "stretch", "number", "first", "own", "seconds", "hurried")
+_APART = 4
+"""Frames that a transition keeps from other seams, so that it can be faded over."""
+
+_NEAR_SEAM, _NEAR_KEY = 10.0, 1000.0
+"""What a transition costs so close to another seam, and within the clip of a key moment."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Piece:
+    """What was found for a window. player, stretch, number, first, own: the unit's (`units.Unit`). edit: at the
+    library's rate, from the unit's first frame on. seconds: of processor time that it took. warnings: what the library
+    lacks of what is asked. hurried: frame of `edit` from which on it was searched in a hurry, or None."""
+
+    player: str
+    stretch: int
+    number: int
+    first: int
+    own: tuple[int, int]
+    edit: NamedEdit
+    seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
+    hurried: int | None = None
+
+
+def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None = None,
+             hurry: Callable[[], bool] | None = None) -> Piece:  # fmt: skip
+    """The edit list of one window of a player.
+
+    library: the recordings; where the plan allows made clips, all windows are offered them, so that neighbours choose
+    from the same. Raises what `synthesize` raises. The same library, unit and numpy give the same bits.
+    """
+    from threadpoolctl import threadpool_limits
+
+    begun = time.process_time()
+    with threadpool_limits(limits=1):
+        library = searched_library(library, unit.plan)
+        plan = resolve_plan(unit.plan, library, touches_solved=True)
+        order = build_order(library, plan)
+        search = PathSearch(library, order, balanced(unit.plan.alpha), cancelled=cancelled, hurry=hurry, on_grid=True)
+        edit = exact_keys(library, search.run(), order)
+    return Piece(player=unit.player, stretch=unit.stretch, number=unit.number, first=unit.first, own=unit.own,
+                 edit=named(library, edit, plan.timeline.keys), seconds=time.process_time() - begun,
+                 warnings=order.warnings, hurried=search.hurried)  # fmt: skip
+
+
+def searched_library(library: Library, plan: Plan) -> Library:
+    """The library that all windows of a plan are searched in."""
+    return with_chosen_gaits(library.extended if plan.made else library, dict(plan.gaits))
+
+
+def keep_piece(path: Path, piece: Piece) -> None:
+    """Writes a piece; InputError where that cannot be done."""
+    header = {name: getattr(piece, name) for name in _PLAIN}
+    header |= {"warnings": [[str(line), spans_of(line)] for line in piece.warnings]}
+    header |= {"clips": piece.edit.clips, "keys": [asdict(key) for key in piece.edit.keys]}
+    out = io.BytesIO()
+    arrays = {name: getattr(piece.edit, name) for name in _ARRAYS}
+    np.savez_compressed(out, header=np.frombuffer(json.dumps(header).encode(), np.uint8), **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def kept_piece(path: Path) -> Piece | None:
+    """The piece that `keep_piece` wrote; None where there is none, or none that can be read whole."""
+    try:
+        with np.load(path, allow_pickle=False) as kept:
+            header = json.loads(kept["header"].tobytes())
+            arrays = {name: kept[name] for name in _ARRAYS}
+        keys = tuple(NamedKey(**{**key, "words": tuple(key["words"])}) for key in header.pop("keys"))
+        clips = tuple((path, mirrored) for path, mirrored in header.pop("clips"))
+        told = tuple(TimedLine(text, *spans) for text, spans in header["warnings"])
+        header |= {"own": tuple(header["own"]), "warnings": told}
+        return Piece(edit=NamedEdit(clips=clips, **arrays, keys=keys), **header)
+    except Exception:  # a damaged file can fail in any of zipfile's, zlib's, numpy's and our own ways
+        return None
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Where two windows were joined: frame of the stretch, at the library's rate; whether both show the same there."""
+
+    frame: int
+    agreed: bool
+
+
+def spliced(
+    library: Library, plans: Sequence[Plan], pieces: Sequence[Piece], window: float = LAYOUT
+) -> tuple[PlayerEdit, tuple[Joint, ...]]:
+    """A player out of all of his windows, and how these were joined.
+
+    library: in which they were searched. plans: one per stretch, from which `units_of` made its windows; pieces: all of
+    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing.
+    """
+    stretches, joints = [], []
+    for number, plan in enumerate(plans):
+        plan = kept(plan)
+        mine = sorted((piece for piece in pieces if piece.stretch == number), key=lambda piece: piece.number)
+        numbers = [piece.number for piece in mine]
+        if not mine or numbers != list(range(len(mine))):
+            found = f"windows {', '.join(map(str, numbers)) or 'none'} of {plan.track.name}"
+            raise InputError("match", found, "all windows of a stretch", "search the others too")
+        edit, joined = _joined(library, plan, mine)
+        begin = float(plan.track.times[0])
+        warnings = tuple(dict.fromkeys(line for piece in mine for line in piece.warnings))
+        short = tuple((begin + (piece.first + piece.hurried) / FPS, begin + piece.own[1] / FPS)
+                      for piece in mine if piece.hurried is not None)  # fmt: skip
+        stretches.append(Stretch(plan, edit, warnings, short))
+        joints += joined
+    return PlayerEdit(plans[0].track.name, window, tuple(stretches)), tuple(joints)
+
+
+def _joined(library: Library, plan: Plan, pieces: list[Piece]) -> tuple[NamedEdit, list[Joint]]:
+    """The edit list of a stretch, and where its windows were joined."""
+    clips = table([piece.edit for piece in pieces])
+    pieces = [replace(piece, edit=retabled(piece.edit, clips)) for piece in pieces]
+    joints = [_joint(library, plan, *pair) for pair in zip(pieces, pieces[1:])]
+    edges = [0, *(joint.frame for joint in joints), pieces[-1].first + len(pieces[-1].edit)]
+    parts, keys = [], []
+    for piece, low, high in zip(pieces, edges, edges[1:]):
+        parts.append(part(piece.edit, low - piece.first, high - piece.first))
+        keys += [key for key in piece.edit.keys if low <= _frame(plan, key) < high]
+    return chained(parts, keys), joints
+
+
+def _frame(plan: Plan, key: NamedKey) -> float:
+    """The frame of the stretch at which a key moment is played."""
+    moment = next(moment for moment in plan.timeline.keys if moment.time == key.time)
+    return (moment.in_force - float(plan.track.times[0])) * FPS
+
+
+def _joint(library: Library, plan: Plan, before: Piece, after: Piece) -> Joint:
+    """Where one window is left for the next: nearest to the edge between them where both agree."""
+    low, high, edge = after.first, before.first + len(before.edit), after.own[0]
+    (clip, frame), (other, there) = (
+        tuple(values[low - piece.first : high - piece.first] for values in piece.edit.frames())
+        for piece in (before, after)
+    )
+    same = (clip == other) & (np.abs(frame - there) < CONTINUES)
+    at = np.flatnonzero(same[1:] & same[:-1]) + 1
+    if len(at):
+        return Joint(low + int(at[np.argmin(np.abs(low + at - edge))]), True)
+    return Joint(low + 1 + int(np.argmin(_costs(library, plan, before, after=after, low=low, high=high))), False)
+
+
+def _costs(library: Library, plan: Plan, before: Piece, after: Piece, low: int, high: int) -> np.ndarray:
+    """(high - low - 1,) what it costs to leave one window for the next at frames low + 1 .. high."""
+    library = searched_library(library, plan)
+    begin = float(plan.track.times[0])
+    here = cut_plan(plan, begin + low / FPS, begin + (high - 1) / FPS)
+    order = build_order(library, resolve_plan(here, library, touches_solved=True))
+    leaves, enters = (bound(library, part(p.edit, low - p.first, high - p.first)) for p in (before, after))
+    costs = PathCosts(library, order, balanced(plan.alpha))
+    step = np.gradient(leaves.frame)
+    step[np.append(leaves.seams, leaves.seams - 1)] = 1.0
+    terms = costs.cut_terms(leaves.frame[:-1] + step[:-1], enters.frame[1:])
+    cost = np.diagonal(sum(values for _, values in terms)).copy()
+    at = np.arange(1, high - low)
+    for seam in (*leaves.seams, *enters.seams):
+        cost += _NEAR_SEAM * ((np.abs(at - seam) < _APART) & (at != seam))
+    for key in (*before.edit.keys, *after.edit.keys):
+        name = before.edit.clips[key.clip]
+        rate = FPS / next(clip for clip in library.clips if (clip.path, clip.mirrored) == name).motion.fps
+        entry, leave = (max(AROUND, seconds * rate) for seconds in (key.frame - key.start, key.end - key.frame))
+        middle = _frame(plan, key) - low
+        cost += _NEAR_KEY * ((at > middle - entry) & (at < middle + leave))
+    return cost
