@@ -15,10 +15,10 @@ import numpy as np
 
 from ..base.errors import InputError, TimedLine
 from ..base.runs import runs
+from .files.unit_and_axes import handedness
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
 from .trial import MarkerTrial
-from .upright import handedness
 
 _MIRRORED = -0.5
 _OFF = 0.012  # metres by which a distance may differ, beside half of what it does in the trial itself

@@ -92,7 +92,7 @@ class Reconstruction:
 
     def report(self) -> dict:
         """The figures, for JSON."""
-        from .report.reconstruction import figures
+        from .reconstruction_figures import figures
 
         return {"version": __version__, **figures(self)}
 
@@ -208,7 +208,7 @@ def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructS
 
 def named_by(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """The trial under the set's own names."""
-    from .naming import named_as
+    from .model.marker_set import named_as
 
     return trial if marker_set is None else named_as(trial, marker_set)
 
@@ -249,7 +249,7 @@ def modelled(
 
 def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """The trial under the set's names, its frames on even times."""
-    from .frame_times import evenly
+    from .trial import evenly
 
     return evenly(named_by(trial, marker_set))
 
@@ -329,8 +329,7 @@ def _ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | Non
 
 def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, road: _Road):
     """The motion after both filters, and which points of the feet are held. trial: as it was seen, no gap filled."""
-    from .pose.butterworth import butterworth
-    from .pose.kalman import kalman
+    from .pose.low_pass import butterworth, kalman
     from .pose.plant_filter import plant_filter
 
     motion = solved.motion
@@ -370,7 +369,7 @@ def _has_legs(motion: Motion) -> bool:
 
 def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
     """Height in metres of the floor, told where it is not at 0."""
-    from .floor import floor_under
+    from .pose.residuals import floor_under
 
     floor = floor_under(model, trial)
     if abs(floor) > _TOLD_FLOOR:
@@ -390,7 +389,7 @@ def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
 
 def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
     """When and how the ball left the hand, where that is asked for; it lies there as the model says, if it says so."""
-    from .release.radar import radar_speed
+    from .release.release import radar_speed
 
     label = _ball_label(model, marker_set, trial)
     told = label is not None or radar_speed(trial.name) is not None

@@ -173,7 +173,7 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
         groups.setdefault((first[path].subject, own.set_name, own.skeleton.names), []).append(path)
     for paths in groups.values():
         if len({first[path].recording.session for path in paths}) > 1:
-            from .model.subject import subject_models
+            from .model.assemble import subject_models
 
             models.update(zip(paths, subject_models([models[path] for path in paths])))
     return models

@@ -13,8 +13,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ..frames import RigidFit, rigid_fit, taken_back
-from .cluster_shape import Shape, distance_spread, mean_shape
-from .robust import median
+from .cluster_shape import Shape, distance_spread, mean_shape, median
 
 _MOST_HELPERS = 5
 # helpers must keep their distances from each other to this, m; where too few do, to the next

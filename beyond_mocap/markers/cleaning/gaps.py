@@ -10,8 +10,7 @@ import numpy as np
 from ...base.easing import hermite
 from ...base.runs import runs
 from .carriers import Carried, carried, helpers_of
-from .cluster_shape import Shape, mean_shape
-from .robust import quantile
+from .cluster_shape import Shape, mean_shape, quantile
 
 # a marker that strays this far from its place among its helpers rides on them softly, m: as a rule; in a twentieth of
 # the frames

@@ -14,7 +14,7 @@ import numpy as np
 from ...base.runs import runs
 from ..frames import placed, rigid_fit
 from .carriers import Carried
-from .robust import median
+from .cluster_shape import median
 
 # exchanging must bring the deformation down to this part of it and by this much, m
 _PART, _LESS = 0.6, 0.008

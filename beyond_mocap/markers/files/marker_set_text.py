@@ -9,9 +9,8 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...files.content import utf8
-from ..model.landmarks import LANDMARKS
 from ..model.marker_set import MarkerSet
-from ..model.template import JOINTS
+from ..model.template import JOINTS, LANDMARKS
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
 LARGEST = 1_000_000

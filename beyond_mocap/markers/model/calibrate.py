@@ -24,15 +24,12 @@ from ...motion.motion import Motion, forward_kinematics
 from ..frames import rigid_fit
 from ..pose.chain import chain
 from ..pose.pose import PoseSettings, Solved, solve
-from ..pose.residuals import seen_markers
-from ..pose.weights import cluster_deviation, edge_deviation
+from ..pose.residuals import cluster_deviation, edge_deviation, seen_markers
 from ..trial import MarkerTrial
 from .adjustment import Adjustment, Body, Prior, Pull
-from .assemble import SIGMA, model_from_frame
-from .joint_freedom import freedom_of
+from .assemble import SIGMA, model_from_frame, static_frame
 from .marker_set import MarkerSet
-from .model import MarkerModel
-from .static import static_frame
+from .model import MarkerModel, freedom_of
 
 FRAMES = 60
 _STATIC_FRAMES = 4

@@ -1,4 +1,5 @@
-"""The skeleton that markers are fitted to, and a typical body on it: where joints and landmarks of an adult lie.
+"""The skeleton that markers are fitted to, the anatomical points that markers lie on, and where both lie on a typical
+body. Every marker set translates its labels into these landmarks.
 
 Joints are named as Mixamo and LAFAN1 do. In the rest pose the body stands in a T-pose facing +X, thumbs forward, and
 all joints' frames are the world's: X forward, Y left, Z up. Thus an arm's long axis is Y (left: outwards), a leg's -Z,
@@ -87,6 +88,28 @@ _LANDMARKS = {
     "left_metatarsal_5": ("LeftFoot", (0.095, 0.135, -0.905)),
     "left_toe_tip": ("LeftToeBase", (0.200, 0.080, -0.905)),
 }
+
+_CENTRE = (
+    "sacrum",  # between the posterior superior iliac spines
+    "c7", "t7", "t10",  # spinous processes
+    "jugular_notch", "sternum",  # upper and lower end of the breastbone
+    "head_front", "head_back", "head_top",
+)
+_SIDES = (
+    "asis", "psis", "iliac_crest",  # iliac spines; crest at the side
+    "scapula",  # on the blade of the shoulder
+    "acromion",
+    "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "wrist",  # `wrist`: a lone marker on its back
+    "knuckle",  # head of the second or third metacarpal, from the back
+    "fingertip",
+    "trochanter", "thigh",  # `thigh`, `shank`: markers in the plane of hip, knee and ankle, as on Plug-in Gait's wands
+    "knee_lateral", "knee_medial", "patella", "shank", "ankle_lateral", "ankle_medial",
+    "heel", "toe",  # `toe`: head of the second metatarsal, from above
+    "metatarsal_1", "metatarsal_5", "toe_tip",
+    "temple", "occiput",
+)
+LANDMARKS = frozenset((*_CENTRE, *(f"{side}_{name}" for side in ("left", "right") for name in _SIDES)))
+"""All landmarks; those of a limb or half begin with left_ or right_."""
 
 
 def _other(name: str) -> str:

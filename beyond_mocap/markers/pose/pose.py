@@ -16,10 +16,9 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 from ..frames import placed as carried
 from ..frames import rigid_fit
-from . import weights as marker_weights
 from .chain import Chain, Poses, chain, place, poses
 from .descent import HeldPoint, Task, descend
-from .residuals import seen_markers
+from .residuals import marker_weights, seen_markers
 from .smooth import smooth
 from .start import first_poses
 
@@ -204,7 +203,7 @@ class _Solving:
     def _weights(self, usual) -> np.ndarray:
         if not self.settings.weights:
             return self.there.astype(float)
-        return marker_weights.weights(self.chain.joint, self.chain.places, self.positions, usual)
+        return marker_weights(self.chain.joint, self.chain.places, self.positions, usual)
 
     def run(self) -> None:
         """Solve the frames that show enough, fill in the others."""

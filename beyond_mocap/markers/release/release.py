@@ -21,14 +21,9 @@ from ...motion.hand import Hand, hand_of, usual_centre
 from ...motion.humanoid import identify
 from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
-from ..frame_times import evenly
-from ..trial import MarkerTrial
-from .carry import carried_and_thrown
-from .first_guess import by_distance, fastest, speeds
-from .hand_ball import HandBall, ball_in_hand
-from .hand_markers import sharpened
+from ..trial import MarkerTrial, evenly
 from .launch_fit import Held, fit_launch
-from .radar import radar_speed
+from .throwing_hand import HandBall, ball_in_hand, by_distance, carried_and_thrown, fastest, sharpened, speeds
 from .without_ball import HOLD, release_by_hand
 
 FEWEST = 12
@@ -44,6 +39,15 @@ _REACHES = 0.35  # m from the palm, within which a marker may be on a ball that 
 _BESIDE = 1.5  # m, between the middle of the markers and that of the joints
 _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
+
+MPH, KMH = 0.44704, 1.0 / 3.6
+SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0
+"""m/s: what a ball out of a hand can have; a number outside is something else."""
+
+# pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
+_PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")
+_WITH_UNIT = re.compile(r"(?<![\d.])(\d{1,3}(?:[.,p]\d{1,2})?)[ _-]?(mph|kmh|kph|km[_-]h|mps|m[_-]s)(?![a-z])", re.I)
+_UNITS = {"mph": MPH, "kmh": KMH, "kph": KMH, "km_h": KMH, "mps": 1.0, "m_s": 1.0}
 
 
 @dataclass(frozen=True)
@@ -375,3 +379,23 @@ def _stride(motion: Motion) -> np.ndarray:
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
+
+
+def radar_speed(name: str) -> float | None:
+    """m/s out of a file's name without its ending, or None where it tells no speed for certain.
+
+    `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` say it with a
+    unit. Two different speeds in one name are none.
+    """
+    pitch = _PITCH.match(name)
+    if pitch:
+        return _possible_speed(int(pitch[1]) / 10.0 * MPH)
+    told = {
+        round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6)
+        for number, unit in _WITH_UNIT.findall(name)
+    }
+    return _possible_speed(told.pop()) if len(told) == 1 else None
+
+
+def _possible_speed(speed: float) -> float | None:
+    return speed if SLOWEST_THROW <= speed <= FASTEST_THROW else None

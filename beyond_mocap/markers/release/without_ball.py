@@ -26,7 +26,7 @@ import numpy as np
 
 from ...base.time_series import interpolate
 from ...motion.hand import Hand
-from .first_guess import fastest
+from .throwing_hand import fastest
 
 SPEED_SIGMA = 0.06
 """Of the speed, one standard deviation."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...motion import contacts as foot_contacts
-from ...motion.humanoid import identify
-from ...motion.motion import Motion, forward_kinematics
-from ...synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
-from ..pose.residuals import residuals
+from ..base.errors import InputError
+from ..motion import contacts as foot_contacts
+from ..motion.humanoid import identify
+from ..motion.motion import Motion, forward_kinematics
+from ..synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
+from .pose.residuals import residuals
 
 
 def figures(made) -> dict:
