@@ -28,10 +28,8 @@ _FEW = 4  # distances that are too few to tell
 _EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2  # from when on a stretch with so few markers is told
 
 
-def check(
-    trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
-    model: MarkerModel | None = None,
-) -> tuple[str, ...]:
+def check(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
+          model: MarkerModel | None = None) -> tuple[str, ...]:
     """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
 
     clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and
@@ -167,10 +165,8 @@ def _same_body(trial: MarkerTrial, known, clusters, name: str, what: str) -> lis
     told = ", ".join(f"{a}-{b} {1000 * usual[a, b]:.0f} against {1000 * known[a, b]:.0f} mm" for a, b in worst)
     count = f"{int(wrong.sum())} of {len(pairs)} distances within segments differ from {what}'s: {told}"
     if share >= _OTHER_BODY:
-        raise InputError(
-            trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
-            f"{what} of the same body in the same session", "choose that, or go without",
-        )
+        raise InputError(trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
+                         f"{what} of the same body in the same session", "choose that, or go without")
     return [f"{count}; some markers may have been put on anew"]
 
 

@@ -97,14 +97,9 @@ class Reconstruction:
         return {"version": __version__, **figures(self)}
 
 
-def reconstruct(
-    trial: MarkerTrial,
-    static: MarkerTrial | None = None,
-    model: MarkerModel | None = None,
-    settings: ReconstructSettings = ReconstructSettings(),
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Reconstruction:
+def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: MarkerModel | None = None,
+                settings: ReconstructSettings = ReconstructSettings(), progress: Progress | None = None,
+                cancelled: Callable[[], bool] | None = None) -> Reconstruction:
     """The skeleton that moved under the markers of a trial.
 
     static: the same markers on the same standing body, from which the model is made; without one it is made of the
@@ -234,10 +229,8 @@ def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
     return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
 
 
-def modelled(
-    trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
-    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
-) -> MarkerModel:
+def modelled(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
+             progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model alone, as `reconstruct` makes it of a trial and its static. Raises as that does."""
     marker_set = set_of(trial, None, settings)
     seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))

@@ -65,14 +65,9 @@ def recordings_of(folder: Path) -> list[Recording]:
     return [Recording(path, name, session.removeprefix(".")) for path, name, session in zip(paths, names, sessions)]
 
 
-def reconstruct_folder(
-    folder: Path,
-    read: Read,
-    settings: ReconstructSettings = ReconstructSettings(),
-    model: MarkerModel | None = None,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Iterator[Made]:
+def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings = ReconstructSettings(),
+                       model: MarkerModel | None = None, progress: Callable[[float, str], None] | None = None,
+                       cancelled: Callable[[], bool] | None = None) -> Iterator[Made]:
     """Every trial of a folder, one after the other; what cannot be made is told and does not stop the others.
 
     read: reads one file. model: for all of them, instead of models made here. InputError for a folder without trials.

@@ -61,15 +61,11 @@ class MarkerTrial:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self):
-        kept = {
-            "labels": tuple(self.labels),
-            "positions": _frozen(self.positions, self.name, "positions"),
-            "fps": float(self.fps),
-            "residuals": None if self.residuals is None else _frozen(self.residuals, self.name, "residuals"),
-            "events": tuple(sorted(self.events, key=lambda event: event.seconds)),
-            "start": float(self.start),
-            "notes": tuple(self.notes),
-        }
+        kept = {"labels": tuple(self.labels), "positions": _frozen(self.positions, self.name, "positions"),
+                "fps": float(self.fps),
+                "residuals": None if self.residuals is None else _frozen(self.residuals, self.name, "residuals"),
+                "events": tuple(sorted(self.events, key=lambda event: event.seconds)), "start": float(self.start),
+                "notes": tuple(self.notes)}
         for name, value in kept.items():
             object.__setattr__(self, name, value)
         self._check()
@@ -123,12 +119,8 @@ class MarkerTrial:
         """The trial with these markers alone, in this order. InputError where one is missing."""
         chosen = [self.index(label) for label in labels]
         residuals = None if self.residuals is None else self.residuals[:, chosen]
-        return replace(
-            self,
-            labels=tuple(self.labels[i] for i in chosen),
-            positions=self.positions[:, chosen],
-            residuals=residuals,
-        )
+        return replace(self, labels=tuple(self.labels[i] for i in chosen), positions=self.positions[:, chosen],
+                       residuals=residuals)
 
     def frames(self, first: int, end: int) -> MarkerTrial:
         """The frames from `first` up to, not with, `end`, on the same clock; events outside are left out."""

@@ -91,12 +91,11 @@ def _throw(release: Mapping | None) -> Throw | None:
         return None
     impact = release.get("impact_m")
     speed = float(release["speed_m_s"])
-    return Throw(
-        speed=speed, radar=release.get("radar_speed_m_s"), side=str(release.get("hand", "")),
-        hips=np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
-        impact=None if impact is None else np.array(impact[:2], float),
-        velocity=speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float), how=str(release.get("how", "")),
-    )  # fmt: skip
+    return Throw(speed=speed, radar=release.get("radar_speed_m_s"), side=str(release.get("hand", "")),
+                 hips=np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
+                 impact=None if impact is None else np.array(impact[:2], float),
+                 velocity=speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float),
+                 how=str(release.get("how", "")))
 
 
 def _number(value) -> float:

@@ -80,14 +80,9 @@ def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> n
     return soft
 
 
-def carriers(
-    positions: np.ndarray,
-    soft: np.ndarray,
-    wanted: Iterable[int],
-    known: Mapping[int, Carried] = MappingProxyType({}),
-    changed: Iterable[int] = (),
-    ask: Callable[[], None] = lambda: None,
-) -> dict[int, Carried]:
+def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
+             known: Mapping[int, Carried] = MappingProxyType({}), changed: Iterable[int] = (),
+             ask: Callable[[], None] = lambda: None) -> dict[int, Carried]:
     """Marker -> how it is carried, for `wanted` markers of positions (T, M, 3) m.
 
     soft: (M, M) m from `softness`. known: an earlier look, of whose markers a few samples have `changed`: their shapes

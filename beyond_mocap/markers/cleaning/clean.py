@@ -73,14 +73,12 @@ class CleanReport:
     @property
     def lines(self) -> tuple[str, ...]:
         """What people should know, the gravest first; each line knows its seconds (`errors.spans_of`)."""
-        return (
-            *(_swapped(swap) for swap in self.swaps),
-            *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
-            *_by_label(self.jumps, "jumping frames taken out"),
-            *_by_label(self.strayed, "frames far from where the markers around it say"),
-            *_by_label(self.left, "frames not seen and left open"),
-            *_summed(self.gaps, "frames not seen and filled"),
-        )
+        return (*(_swapped(swap) for swap in self.swaps),
+                *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
+                *_by_label(self.jumps, "jumping frames taken out"),
+                *_by_label(self.strayed, "frames far from where the markers around it say"),
+                *_by_label(self.left, "frames not seen and left open"),
+                *_summed(self.gaps, "frames not seen and filled"))
 
     def as_dict(self) -> dict:
         """The report as plain values, for JSON."""
@@ -206,13 +204,9 @@ class _Work:
                        off=float(off))
 
 
-def clean(
-    trial: MarkerTrial,
-    clusters: Mapping[str, Sequence[str]] | None = None,
-    settings: CleanSettings = CleanSettings(),
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Cleaned:
+def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
+          settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
+          cancelled: Callable[[], bool] | None = None) -> Cleaned:
     """A trial without swaps, jumps and the gaps that can be filled, and a report.
 
     clusters: segment -> labels of its markers, where a marker set is known (labels that the trial lacks are skipped);
@@ -221,11 +215,9 @@ def clean(
     clusters = clusters or {}
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}
-    work = _Work(
-        trial, np.array(trial.positions),
-        [[index[label] for label in labels if label in index] for labels in clusters.values()],
-        unlabeled(trial.labels, known), lambda: _go_on(cancelled),
-    )
+    work = _Work(trial, np.array(trial.positions),
+                 [[index[label] for label in labels if label in index] for labels in clusters.values()],
+                 unlabeled(trial.labels, known), lambda: _go_on(cancelled))
     work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
     steps = [("who carries whom", _Work.look)]
     steps += [("swaps", _swaps)] if settings.swaps else []

@@ -54,14 +54,8 @@ def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
             for first, end in runs(~seen[:, marker])]
 
 
-def fill(
-    positions: np.ndarray,
-    soft: np.ndarray,
-    fps: float,
-    longest: Longest,
-    known: Mapping[int, Carried],
-    ask: Callable[[], None] = lambda: None,
-) -> tuple[np.ndarray, list[Gap]]:
+def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, known: Mapping[int, Carried],
+         ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
     """(positions (T, M, 3) m with gaps filled, the gaps and how): nothing that was seen is moved, and nothing jumps.
 
     soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries

@@ -233,9 +233,8 @@ def unlabeled(labels: Sequence[str], known: Sequence[str] = ()) -> list[int]:
     return [index for index, label in enumerate(labels) if label not in known and UNLABELED.match(label)]
 
 
-def assign(
-    positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequence[int], fps: float
-) -> tuple[np.ndarray, list[Assigned]]:
+def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequence[int],
+           fps: float) -> tuple[np.ndarray, list[Assigned]]:
     """(positions (T, M, 3) m, what was assigned): pieces of the `nameless` markers moved to the labels they belong to.
 
     The best fitting first; a label takes at most one at a time, and a piece gives each of its frames once.

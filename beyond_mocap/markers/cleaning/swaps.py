@@ -67,14 +67,8 @@ def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tup
     return out, found
 
 
-def mend(
-    positions: np.ndarray,
-    carried: Mapping[int, Carried],
-    leaping: np.ndarray,
-    fps: float,
-    opposite: Sequence[Pairs] = (),
-    ask: Callable[[], None] = lambda: None,
-) -> tuple[np.ndarray, list[Swap]]:
+def mend(positions: np.ndarray, carried: Mapping[int, Carried], leaping: np.ndarray, fps: float,
+         opposite: Sequence[Pairs] = (), ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Swap]]:
     """(positions (T, M, 3) m with swaps exchanged back, the swaps): what deforms the clusters and mends them exchanged.
 
     leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and

@@ -18,11 +18,8 @@ from .unit_and_axes import decide_unit, handedness, read_given_unit, tall, up_ax
 
 _WILD = 1e9  # in any unit
 _FARTHEST = 1000.0  # metres from the origin: a mark for "not seen", or damage
-_UP = {
-    (2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)),
-    (1, 1): ((0, 2, 1), (1, -1, 1)), (1, -1): ((0, 2, 1), (1, 1, -1)),
-    (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1)),
-}  # fmt: skip
+_UP = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
+       (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
 """What points up in the file, (axis, sign) -> which of its axes ours are, and their signs: turned, never mirrored."""
 
 FEWEST_OF_A_BODY = 10
@@ -138,12 +135,8 @@ def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np
     """The places with Z up: as given, else as the file says, else as the body stands, else as such files usually
     are."""
     stands = up_axis(labels, positions)
-    said = {
-        "as given": None if given is None else axis_named(given),
-        "as the file says": raw.up,
-        "heads above feet": stands,
-        "as such files usually are": raw.usual_up,
-    }
+    said = {"as given": None if given is None else axis_named(given), "as the file says": raw.up,
+            "heads above feet": stands, "as such files usually are": raw.usual_up}
     why, up = next((why, up) for why, up in said.items() if up)
     notes.append(f"{_axis(up)} is up, {why}")
     if stands and stands != up and given is None:

@@ -313,14 +313,11 @@ def trc_text(trial: MarkerTrial, name: str = "") -> str:
     """The text of a TRC file; `name` stands in its first line."""
     labels = [" ".join(label.split()) for label in trial.labels]
     count, rate = len(labels), f"{trial.fps:.6f}"
-    head = [
-        f"PathFileType\t4\t(X/Y/Z)\t{name or trial.name}",
-        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
-        f"{rate}\t{rate}\t{len(trial)}\t{count}\tmm\t{rate}\t1\t{len(trial)}",
-        "Frame#\tTime\t" + "\t".join(f"{label}\t\t" for label in labels),
-        "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, count + 1)),
-        "",
-    ]
+    head = [f"PathFileType\t4\t(X/Y/Z)\t{name or trial.name}",
+            "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+            f"{rate}\t{rate}\t{len(trial)}\t{count}\tmm\t{rate}\t1\t{len(trial)}",
+            "Frame#\tTime\t" + "\t".join(f"{label}\t\t" for label in labels),
+            "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, count + 1)), ""]
     places = 1000.0 * trial.positions[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
     rows = [f"{i}\t{seconds:.7f}\t{_row_text(frame, seen)}"
             for i, (seconds, frame, seen) in enumerate(zip(trial.seconds, places, trial.seen), 1)]  # fmt: skip

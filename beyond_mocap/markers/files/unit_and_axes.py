@@ -15,15 +15,11 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 
-NAMES = {
-    "m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0,
-    "dm": 0.1, "decimeter": 0.1, "decimeters": 0.1,
-    "cm": 0.01, "centimeter": 0.01, "centimeters": 0.01, "centimetre": 0.01, "centimetres": 0.01,
-    "mm": 0.001, "millimeter": 0.001, "millimeters": 0.001, "millimetre": 0.001, "millimetres": 0.001,
-    "um": 1e-6, "micrometer": 1e-6, "micrometers": 1e-6,
-    "in": 0.0254, "inch": 0.0254, "inches": 0.0254, '"': 0.0254,
-    "ft": 0.3048, "foot": 0.3048, "feet": 0.3048,
-}  # fmt: skip
+NAMES = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "dm": 0.1, "decimeter": 0.1,
+         "decimeters": 0.1, "cm": 0.01, "centimeter": 0.01, "centimeters": 0.01, "centimetre": 0.01,
+         "centimetres": 0.01, "mm": 0.001, "millimeter": 0.001, "millimeters": 0.001, "millimetre": 0.001,
+         "millimetres": 0.001, "um": 1e-6, "micrometer": 1e-6, "micrometers": 1e-6, "in": 0.0254, "inch": 0.0254,
+         "inches": 0.0254, '"': 0.0254, "ft": 0.3048, "foot": 0.3048, "feet": 0.3048}
 _GUESSED = ("mm", "m", "cm", "in")
 _USUAL = 1.5  # metres that the markers of a standing body span
 _GUESS_RANGE = (0.5, 2.6)

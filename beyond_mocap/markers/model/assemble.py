@@ -47,9 +47,8 @@ def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> d
     return found
 
 
-def model_from_frame(
-    frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "", session: str = ""
-) -> MarkerModel:
+def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "",
+                     session: str = "") -> MarkerModel:
     """The model that one frame gives, with predicted joint centres.
 
     frame: label -> (3,) m, Z up, NaN where not seen. standing: whether it is a static trial's frame. InputError where
@@ -60,10 +59,8 @@ def model_from_frame(
     return model_from_centres(centres, frame, carried, marker_set=marker_set, subject=subject, session=session)
 
 
-def model_from_centres(
-    centres: Centres, frame: Mapping[str, np.ndarray], carried: Mapping[str, str | None], marker_set: MarkerSet,
-    subject: str = "", session: str = "",
-) -> MarkerModel:
+def model_from_centres(centres: Centres, frame: Mapping[str, np.ndarray], carried: Mapping[str, str | None],
+                       marker_set: MarkerSet, subject: str = "", session: str = "") -> MarkerModel:
     """The model with these joint centres and axes, on which each marker of the frame lies where it was seen."""
     names = _joint_names(centres, set(carried.values()))
     skeleton, axes, places = _skeleton(centres, names)
@@ -80,12 +77,11 @@ def model_from_centres(
         raise InputError("model", "no marker on any joint", "markers of the set", "check labels and marker set")
     counts = {name: joints.count(index) for index, name in enumerate(names)}
     freedom, stiffness = freedom_of(names, skeleton.parents, counts)
-    return MarkerModel(
-        skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
-        sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
-        stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]), subject=subject,
-        sessions=(session,) if session else (), set_name=marker_set.name, notes=tuple(centres.notes),
-    )
+    return MarkerModel(skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
+                       sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
+                       stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]),
+                       subject=subject, sessions=(session,) if session else (), set_name=marker_set.name,
+                       notes=tuple(centres.notes))
 
 
 def _joint_names(centres: Centres, carriers: set) -> list[str]:
@@ -112,19 +108,16 @@ def _skeleton(centres: Centres, names: list[str]):
     parents = [_parent(name, names) for name in names]
     axes = np.array([centres.axes[name] for name in names])
     places = np.array([centres.places[name] for name in names])
-    offsets = np.array([
-        axes[parent].T @ (places[index] - places[parent]) if parent >= 0 else np.zeros(3)
-        for index, parent in enumerate(parents)
-    ])
+    offsets = np.array([axes[parent].T @ (places[index] - places[parent]) if parent >= 0 else np.zeros(3) for index,
+                        parent in enumerate(parents)])
     tips = [(names.index(joint), place) for joint, place in centres.tips.items() if joint in names]
     ends = [axes[joint].T @ (place - places[joint]) for joint, place in tips]
     skeleton = Skeleton(tuple(names), tuple(parents), offsets, tuple(joint for joint, _ in tips), np.array(ends))
     return skeleton, axes, places
 
 
-def static_frame(
-    trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], seconds: float = 2.0
-) -> dict[str, np.ndarray]:
+def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
+                 seconds: float = 2.0) -> dict[str, np.ndarray]:
     """The markers of a static trial as one frame: label -> (3,) m, NaN for what is never seen in its stillest
     `seconds`.
 
@@ -170,10 +163,8 @@ def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
     unrest = [(-round(float(seen[a : a + length].mean())), float(medians(moved[a : a + length]))) for a in starts]
     best = min(range(len(starts)), key=lambda i: unrest[i])
     if unrest[best][1] > _STILL:
-        raise InputError(
-            trial.name, f"its stillest {length / trial.fps:.1f} s still move at {unrest[best][1]:.2f} m/s",
-            "a static trial, in which somebody stands", "choose another, or go without",
-        )
+        raise InputError(trial.name, f"its stillest {length / trial.fps:.1f} s still move at {unrest[best][1]:.2f} m/s",
+                         "a static trial, in which somebody stands", "choose another, or go without")
     return int(starts[best]), int(starts[best]) + length
 
 

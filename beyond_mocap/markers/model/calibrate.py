@@ -57,9 +57,8 @@ _FRAMES = 40
 _FEWEST = 3  # frames in which a marker has to be seen
 
 
-def with_late_markers(
-    model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial, cancelled: Callable[[], bool] | None = None
-) -> MarkerModel:
+def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial,
+                      cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model with the set's markers that it lacks and the trial shows, and joints freed that they now tell.
 
     Each lies at the median of where it is seen in its segment's frame, over some frames solved without it.
@@ -93,13 +92,10 @@ def _added(model: MarkerModel, labels: list[str], joints: list[int], places: lis
     joint = np.concatenate([model.joint, joints])
     counts = {name: int(np.sum(joint == index)) for index, name in enumerate(model.skeleton.names)}
     freedom, stiffness = freedom_of(model.skeleton.names, model.skeleton.parents, counts)
-    return replace(
-        model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
-        sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
-        edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]),
-        freedom=freedom, stiffness=stiffness,
-        notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"),
-    )
+    return replace(model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
+                   sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
+                   edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]), freedom=freedom,
+                   stiffness=stiffness, notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"))
 
 
 def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], count: int) -> list[int]:
@@ -169,13 +165,9 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
     return np.sort(frames[chosen])
 
 
-def calibrate(
-    marker_set: MarkerSet,
-    trial: MarkerTrial,
-    static: MarkerTrial | None = None,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> MarkerModel:
+def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | None = None,
+              progress: Callable[[float, str], None] | None = None,
+              cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model of the body in `trial`.
 
     trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
@@ -216,10 +208,8 @@ def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
 def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
     """The mean of the models that some upright frames of a motion give."""
     index = {label: i for i, label in enumerate(trial.labels)}
-    landmarks = {
-        name: tuple(index[label] for label in labels)
-        for name, labels in marker_set.landmarks.items() if all(label in index for label in labels)
-    }
+    landmarks = {name: tuple(index[label] for label in labels) for name,
+                 labels in marker_set.landmarks.items() if all(label in index for label in labels)}
     found, reason = [], None
     for frame in neutral_frames(trial, landmarks, _NEUTRAL_FRAMES):
         places = dict(zip(trial.labels, trial.positions[frame]))
@@ -231,20 +221,16 @@ def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
         raise reason or InputError(trial.name, "no frames")
     most = max(found, key=lambda model: (len(model.skeleton), len(model.markers)))
     alike = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
-    skeleton = replace(
-        most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
-        end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0),
-    )
+    skeleton = replace(most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
+                       end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0))
     note = f"no static trial: begun with {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
     places = np.mean([m.places for m in alike], axis=0)
     return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
 
 
-def refined(
-    model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
-    cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
-    place_sigma: float = _PLACE_SIGMA,
-) -> MarkerModel:
+def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
+            cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
+            place_sigma: float = _PLACE_SIGMA) -> MarkerModel:
     """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
     part = _chosen(model, trial, static, frames)
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
@@ -260,10 +246,8 @@ def refined(
         task.sigma = _scatter(task.residuals())
     skeleton = replace(model.skeleton, offsets=body.offsets)
     deviation = edge_deviation(model.joint, body.places, seen_markers(model, part))
-    return replace(
-        model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
-        edge_sigma=cluster_deviation(model.joint, deviation),
-    )
+    return replace(model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
+                   edge_sigma=cluster_deviation(model.joint, deviation))
 
 
 def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, count: int) -> MarkerTrial:

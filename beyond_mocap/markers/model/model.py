@@ -17,24 +17,16 @@ from ...motion.skeleton import Skeleton, frozen_array
 _ANY = (-np.inf, np.inf)
 _NONE = (0.0, 0.0)
 # joint (left side) -> axis order, limits in degrees of each of its three angles, pull in metres per radian
-_TABLE = {
-    "Hips": ("ZYX", (_ANY, _ANY, _ANY), 0.0),
-    "Spine": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Spine1": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Chest": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Neck": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Neck1": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Head": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
-    "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _NONE), 0.004),
-    "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004),
-    "Arm": ("XZY", (_ANY, _ANY, _ANY), 0.0),
-    "ForeArm": ("ZXY", ((-165, 18), (-18, 18), (-150, 150)), 0.0),
-    "Hand": ("XZY", ((-100, 100), (-60, 60), _NONE), 0.002),
-    "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
-    "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
-    "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0),
-    "ToeBase": ("YXZ", ((-80, 60), _NONE, _NONE), 0.002),
-}
+_TABLE = {"Hips": ("ZYX", (_ANY, _ANY, _ANY), 0.0), "Spine": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
+          "Spine1": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Chest": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
+          "Neck": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Neck1": ("YXZ", (_ANY, _ANY, _ANY), 0.01),
+          "Head": ("YXZ", (_ANY, _ANY, _ANY), 0.01), "Shoulder": ("ZXY", ((-45, 45), (-25, 60), _NONE), 0.004),
+          "Scapula": ("ZXY", ((-45, 45), (-25, 60), (-50, 50)), 0.004), "Arm": ("XZY", (_ANY, _ANY, _ANY), 0.0),
+          "ForeArm": ("ZXY", ((-165, 18), (-18, 18), (-150, 150)), 0.0),
+          "Hand": ("XZY", ((-100, 100), (-60, 60), _NONE), 0.002),
+          "UpLeg": ("YXZ", ((-160, 75), (-75, 75), (-80, 80)), 0.0),
+          "Leg": ("YXZ", ((-25, 170), (-12, 12), (-60, 60)), 0.0),
+          "Foot": ("YXZ", ((-75, 90), (-60, 60), (-60, 60)), 0.0), "ToeBase": ("YXZ", ((-80, 60), _NONE, _NONE), 0.002)}
 _WEAK = 0.004  # pull in metres per radian of a joint whose own markers are fewer than a technical frame needs
 _WEAK_FOOT = 0.01  # heel and toe lie nearly on a line with the ankle: a millimetre of skin would be 2 degrees of roll
 

@@ -82,9 +82,7 @@ class Chain:
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
 
-def chain(
-    skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None
-) -> Chain:
+def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None) -> Chain:
     """A chain of these arrays (see `Chain`), whatever is None free of limits and of stiffness. InputError where shapes
     do not fit."""
     count = len(skeleton)

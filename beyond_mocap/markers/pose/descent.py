@@ -63,11 +63,9 @@ class Task:
 
     def frames(self, chosen) -> "Task":
         """These frames only."""
-        return replace(
-            self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
-            lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
-            leaning=None if self.leaning is None else self.leaning[:, chosen],
-        )
+        return replace(self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
+                       lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
+                       leaning=None if self.leaning is None else self.leaning[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,9 +217,8 @@ def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
     return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
 
 
-def _step(
-    task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, State]:
+def _step(task: Task, best: State, stops: dict, damping: np.ndarray,
+          curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
     """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and
     the state it leads to."""
     shift, turns, held = _solved(task, best, stops, damping, curved)

@@ -77,9 +77,8 @@ def _counts(angles: np.ndarray) -> np.ndarray:
     return np.stack([away, np.ones_like(away), away])
 
 
-def hold(
-    chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own, ahead: np.ndarray | None = None
-) -> np.ndarray:
+def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own,
+         ahead: np.ndarray | None = None) -> np.ndarray:
     """Hold still, in place in what is asked of the turns, the angles at a limit that would go on, and let those that a
     first step led over a limit end on it; which joints are held: (J, F) bool.
 

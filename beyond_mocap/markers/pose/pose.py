@@ -53,9 +53,8 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
     return out
 
 
-def between(
-    chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray
-) -> tuple[Poses, np.ndarray]:
+def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
+            frames: np.ndarray) -> tuple[Poses, np.ndarray]:
     """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
     joints any do: (J,) bool.
 
@@ -171,10 +170,8 @@ def _positions(model, trial) -> np.ndarray:
     out = seen_markers(model, trial)
     seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
     if seen < _FEWEST:
-        raise InputError(
-            trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
-            "choose the model or marker set of this recording",
-        )
+        raise InputError(trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
+                         "choose the model or marker set of this recording")
     return out
 
 

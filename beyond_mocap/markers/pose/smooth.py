@@ -141,11 +141,9 @@ def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarra
     across = point.weight * crosswise(far, point.radius)
     row = np.einsum("af,fac->fc", along, exact[:, count])
     rest = exact[:, count] - along.T[:, :, None] * row[:, None]
-    return (
-        np.concatenate([columns, row[:, None], rest], axis=1),
-        np.concatenate([away, far[:, None], np.zeros((frames, 3))], axis=1),
-        np.concatenate([weight, point.weight[:, None], np.repeat(across[:, None], 3, axis=1)], axis=1),
-    )
+    return (np.concatenate([columns, row[:, None], rest], axis=1),
+            np.concatenate([away, far[:, None], np.zeros((frames, 3))], axis=1),
+            np.concatenate([weight, point.weight[:, None], np.repeat(across[:, None], 3, axis=1)], axis=1))
 
 
 def _banded(blocks: np.ndarray, right: np.ndarray, strength: np.ndarray, given: int) -> np.ndarray:

@@ -72,9 +72,8 @@ class LaunchFit:
     seconds: float
 
 
-def fit_launch(
-    marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float, window: float = 0.12
-) -> LaunchFit | None:
+def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float,
+               window: float = 0.12) -> LaunchFit | None:
     """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
 
     guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in

@@ -112,17 +112,16 @@ class Release:
 
     def report(self) -> dict:
         """The figures, for JSON."""
-        return {
-            "release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
-            "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-            "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
-            "radar_speed_m_s": self.radar,
-            "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
-            "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side, "how": self.how,
-            "residual_m": None if np.isnan(self.residual) else self.residual, "flight_frames": self.flight_frames,
-            "impact_m": None if self.impact is None else self.impact.tolist(), "hips_m": self.hips.tolist(),
-            "ball_radius_m": self.radius, "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes),
-        }  # fmt: skip
+        return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
+                "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
+                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
+                "radar_speed_m_s": self.radar,
+                "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
+                "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side,
+                "how": self.how, "residual_m": None if np.isnan(self.residual) else self.residual,
+                "flight_frames": self.flight_frames, "impact_m": None if self.impact is None else self.impact.tolist(),
+                "hips_m": self.hips.tolist(), "ball_radius_m": self.radius,
+                "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes)}
 
 
 def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
@@ -180,9 +179,8 @@ def _check_throws(hand: Hand, name: str) -> None:
     """InputError where the hand is never fast enough to throw."""
     pace = float(np.max(_steady(hand)))
     if pace < SLOWEST:
-        raise InputError(
-            name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or the other hand"
-        )
+        raise InputError(name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw",
+                         "choose another trial, or the other hand")
 
 
 def _check_near(trial: MarkerTrial, motion: Motion) -> None:
@@ -194,10 +192,8 @@ def _check_near(trial: MarkerTrial, motion: Motion) -> None:
         return
     away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
     if away > _BESIDE:
-        raise InputError(
-            trial.name, f"markers {away:.1f} m beside the motion", "the motion that was made from this trial",
-            "reconstruct the trial first",
-        )  # fmt: skip
+        raise InputError(trial.name, f"markers {away:.1f} m beside the motion",
+                         "the motion that was made from this trial", "reconstruct the trial first")
 
 
 def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
@@ -343,9 +339,8 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
-    fits = [(fit_launch(
-        marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius, window=settings.window,
-    ), air)
+    fits = [(fit_launch(marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius,
+                        window=settings.window), air)
             for air in (ball, _without_air(ball))]
     if fits[0][0] is None or fits[1][0] is None:
         return None
@@ -390,10 +385,8 @@ def radar_speed(name: str) -> float | None:
     pitch = _PITCH.match(name)
     if pitch:
         return _possible_speed(int(pitch[1]) / 10.0 * MPH)
-    told = {
-        round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6)
-        for number, unit in _WITH_UNIT.findall(name)
-    }
+    told = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
+            unit in _WITH_UNIT.findall(name)}
     return _possible_speed(told.pop()) if len(told) == 1 else None
 
 

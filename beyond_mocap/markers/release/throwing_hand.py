@@ -68,13 +68,8 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     known = np.isfinite(seen).all(axis=-1) & ~(fit.sound & ~tells)[:, None]
     off = np.where(known[..., None], seen - _placed(hand, shift, places), 0.0).sum(axis=1)
     off = off / np.maximum(known.sum(axis=1), 1)[:, None]  # one or two markers move it, and cannot turn it
-    return replace(
-        moved,
-        reach=_reach(hand, places),
-        origin=np.where(tells[:, None], fit.shift, moved.origin + off),
-        rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation),
-        markers=names,
-    )
+    return replace(moved, reach=_reach(hand, places), origin=np.where(tells[:, None], fit.shift, moved.origin + off),
+                   rotation=np.where(tells[:, None, None], fit.rotation, moved.rotation), markers=names)
 
 
 def _usual(values: np.ndarray) -> float:
