@@ -1,6 +1,5 @@
-"""The results of a folder of reconstructed trials, one row a trial, read from the reports that were written; where their
-throws land, and how fast these are beside a speed gun.
-"""
+"""The results of a folder of reconstructed trials, one row a trial, read from the reports that were written; where
+their throws land, and how fast these are beside a speed gun."""
 
 from __future__ import annotations
 
@@ -42,8 +41,7 @@ class TrialResult:
     """One trial. subject: as the file says, else its session, "" where unknown. frames: how many. squares: m^2,
     weighted squared residuals a frame (mean and standard deviation; eq. 5.1). residual, single: mm, root mean square of
     the model's markers and of single segments. rate: frames a second of the pose. throw: its release, or None. error:
-    why there is no motion, "" where there is.
-    """
+    why there is no motion, "" where there is."""
 
     name: str
     subject: str
@@ -158,8 +156,7 @@ def is_near_mean(points: np.ndarray) -> np.ndarray:
 class Paired:
     """count: of pairs. mean, sd: m/s of estimated - measured. share: of the measured, mean of the absolute differences.
     within: share of pairs that differ by at most 10 %. wilcoxon: two-sided p that the differences are about zero, and
-    normal: p of Shapiro and Wilk that they are normal; NaN where there are too few.
-    """
+    normal: p of Shapiro and Wilk that they are normal; NaN where there are too few."""
 
     count: int
     mean: float

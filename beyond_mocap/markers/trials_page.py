@@ -17,8 +17,16 @@ import numpy as np
 
 from ..evaluation import html_page as html
 from ..evaluation.plots import plain
-from .trial_results import (LEAST, Paired, TrialResult, aligned_impacts, compare_speeds, dominant_sides, is_near_mean,
-                            read_results)
+from .trial_results import (
+    LEAST,
+    Paired,
+    TrialResult,
+    aligned_impacts,
+    compare_speeds,
+    dominant_sides,
+    is_near_mean,
+    read_results,
+)
 
 DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
 _WIDTH, _DPI = 11.0, 100

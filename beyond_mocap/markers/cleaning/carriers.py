@@ -18,10 +18,8 @@ from .cluster_shape import Shape, distance_spread, mean_shape, median
 _MOST_HELPERS = 5
 # helpers must keep their distances from each other to this, m; where too few do, to the next
 _TOLERANCES = (0.012, 0.025, 0.05, 0.1)
-# the most that markers of one segment move against each other, m
-_SKIN = 0.01
-# what distance adds to how soft a pair is held to be, metres a metre
-_FAR = 0.02
+_SKIN = 0.01  # the most that markers of one segment move against each other, m
+_FAR = 0.02  # what distance adds to how soft a pair is held to be, metres a metre
 # a frame made of helpers that deviate more than this is not trusted, m, or than this many times the usual
 _DEFORMED, _TIMES_USUAL = 0.012, 3.0
 

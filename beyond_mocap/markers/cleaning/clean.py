@@ -21,14 +21,11 @@ from .gaps import Longest, fill
 from .pieces import assign, leaps, take_out, unlabeled
 from .swaps import mend, there_and_back
 
-# a marker this much farther from its place than its tolerance for this long is told, s
-_STRAYED, _FOR = 1.5, 0.1
-# within so many frames of a leap or a gap
-_NEAR_BREAK = 3
+_STRAYED, _FOR = 1.5, 0.1  # a marker this much farther from its place than its tolerance for this long is told, s
+_NEAR_BREAK = 3  # within so many frames of a leap or a gap
 
 
-# where more markers than this have something to tell, one line tells it for all
-_MOST_LINES = 6
+_MOST_LINES = 6  # where more markers than this have something to tell, one line tells it for all
 
 
 @dataclass(frozen=True, kw_only=True)

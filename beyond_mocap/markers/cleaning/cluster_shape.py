@@ -1,5 +1,5 @@
-"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all; with
-the medians and quantiles that leave out NaN, for many markers at once.
+"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all;
+with the medians and quantiles that leave out NaN, for many markers at once.
 
 numpy's own (`nanmedian`, `nanpercentile`) go through Python for each column: a hundred times as slow on trials.
 """

@@ -15,10 +15,8 @@ from .cluster_shape import Shape, mean_shape, quantile
 # a marker that strays this far from its place among its helpers rides on them softly, m: as a rule; in a twentieth of
 # the frames
 _SOFT, _SOFT_AT_TIMES = 0.015, 0.03
-# over how much time the slope at a gap's edge is read, s
-_EDGE = 0.03
-# a curve is taken if over stretches as long it would have been this near, m; tried on so many
-_NEAR, _TRIES = 0.02, 24
+_EDGE = 0.03  # over how much time the slope at a gap's edge is read, s
+_NEAR, _TRIES = 0.02, 24  # a curve is taken if over stretches as long it would have been this near, m; tried on so many
 
 
 class Gap(NamedTuple):

@@ -1,6 +1,5 @@
-"""Pieces of a marker's trajectory, cut where it is not seen and where it leaps as no body does: those that jump (ghosts,
-reflections) are taken out, and those of unlabeled markers get the label that is missing where they are.
-"""
+"""Pieces of a marker's trajectory, cut where it is not seen and where it leaps as no body does: those that jump
+(ghosts, reflections) are taken out, and those of unlabeled markers get the label that is missing where they are."""
 
 from __future__ import annotations
 
@@ -20,27 +19,22 @@ from .gaps import bridge
 _LEAP_LOCAL, _LEAP_WORLD, _TIMES_ITS_OWN = 0.02, 0.04, 6.0
 _LEAP_SWING_LOCAL, _LEAP_SWING_WORLD = 200.0, 500.0
 
-# the longest burst that is taken out as a jump, s
-_BURST = 0.08
+_BURST = 0.08  # the longest burst that is taken out as a jump, s
 # and how far off its way it lies at least, m, and as a part of what the marker moves meanwhile
 _LEAST_BURST, _LEAST_SHARE = 0.015, 0.3
-# a longer stretch is a ghost if it lies at least this far from where its helpers say, m
-_GHOST = 0.06
+_GHOST = 0.06  # a longer stretch is a ghost if it lies at least this far from where its helpers say, m
 # a single sample is off if it leaves the way by this much, m (as its helpers see it; in the world), by more than limbs
 # can do in a frame, m/s^2, and by this many times what nine tenths of the samples around it do
 _OFF_LOCAL, _OFF_WORLD, _TIMES = 0.006, 0.015, 3.0
 _SWING_LOCAL, _SWING_WORLD = 100.0, 300.0
 _AROUND = 12
-# a marker that only seems to jump because one of its helpers does stays on its own way in the world
-_ITS_OWN = 0.5
+_ITS_OWN = 0.5  # a marker that only seems to jump because one of its helpers does stays on its own way in the world
 
-# a piece this short tells nothing, s
-_SHORTEST = 0.02
+_SHORTEST = 0.02  # a piece this short tells nothing, s
 # how near a piece must begin to where the label was last seen, and end to where it is seen again, if no cluster tells,
 # m; and how long before or after that may be, s
 _JOINS, _WITHIN = 0.02, 0.05
-# where label and unlabeled are both seen they must agree to this, m
-_AGREES = 0.01
+_AGREES = 0.01  # where label and unlabeled are both seen they must agree to this, m
 
 
 class Piece(NamedTuple):

@@ -1,6 +1,5 @@
-"""Markers as a file holds them, and their way to a trial of ours: one subject, metres, Z up, unique labels, nothing that
-is no marker.
-"""
+"""Markers as a file holds them, and their way to a trial of ours: one subject, metres, Z up, unique labels, nothing
+that is no marker."""
 
 from __future__ import annotations
 

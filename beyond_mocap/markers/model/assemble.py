@@ -1,5 +1,5 @@
-"""Models put together: from one frame of markers (of the motion, or a static trial's mean), and models of several sessions
-made one of the subject (Fredriksson §5.2).
+"""Models put together: from one frame of markers (of the motion, or a static trial's mean), and models of several
+sessions made one of the subject (Fredriksson §5.2).
 
 A standing body breathes and sways. Averaging places would shrink what turns; so each cluster of a static trial is
 averaged in its own technical frame, and the frames against those of the segments they hang on, from the root outwards.
@@ -30,8 +30,7 @@ from .template import JOINTS, PARENTS, SCAPULAE
 SIGMA = 0.008
 """How far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)."""
 
-# nobody who stands still moves faster than this, m/s (median of the markers over a second)
-_STILL = 0.1
+_STILL = 0.1  # nobody who stands still moves faster than this, m/s (median of the markers over a second)
 
 _ROUNDS = 4
 _SURE = 1e-4  # metres: no centre is surer

@@ -1,5 +1,5 @@
-"""Which markers a recording has on which part of the body, which anatomical points they mark, and a trial under the set's
-names.
+"""Which markers a recording has on which part of the body, which anatomical points they mark, and a trial under the
+set's names.
 
 A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on,
 and that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.

@@ -1,5 +1,5 @@
-"""The low-pass filters of a solved motion (Fredriksson §5.4): Butterworth of fourth order, run forth and back, and Kalman
-smoothing, the alternative (§10.2; De Groote et al. 2008).
+"""The low-pass filters of a solved motion (Fredriksson §5.4): Butterworth of fourth order, run forth and back, and
+Kalman smoothing, the alternative (§10.2; De Groote et al. 2008).
 
 Butterworth: two passes of a second order filter make one of fourth order without any delay. Each pass alone lets half
 of the power through at its own cutoff, both together only a quarter, so that each is given a somewhat higher one

@@ -1,6 +1,5 @@
-"""How the markers of a model agree with those that were seen: how far apart they are, how much each counts (less where its
-cluster is bent out of shape, Fredriksson §5.3.2), and on which floor the feet stand.
-"""
+"""How the markers of a model agree with those that were seen: how far apart they are, how much each counts (less where
+its cluster is bent out of shape, Fredriksson §5.3.2), and on which floor the feet stand."""
 
 from __future__ import annotations
 
@@ -99,7 +98,8 @@ def cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.ndarray:
     return out
 
 
-def marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray, usual: np.ndarray | None = None) -> np.ndarray:
+def marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
+                   usual: np.ndarray | None = None) -> np.ndarray:
     """w_i of eq. 5.1 for every frame and marker, (T, M): 0 where it is not seen, else min(1, sigma_s / sigma_i).
 
     Eq. 5.2 is printed the other way round (sigma_i / sigma_s), which would count a marker the more the further it is

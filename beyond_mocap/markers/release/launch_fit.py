@@ -54,9 +54,8 @@ class LaunchFit:
 
     time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
     told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
-    no ball is smaller. residual: m, root mean square of the marker in flight.
-    time_sigma: s and speed_sigma: m/s, one standard deviation each. frames: of flight that were seen. seconds: of
-    flight that were used.
+    no ball is smaller. residual: m, root mean square of the marker in flight. time_sigma: s and speed_sigma: m/s, one
+    standard deviation each. frames: of flight that were seen. seconds: of flight that were used.
     """
 
     time: float

@@ -1,5 +1,5 @@
-"""The hand that throws, frame by frame: sharper by the markers that it carries than its joint of a solved motion; how the
-ball lies in it and goes with it, and a first guess of when it leaves.
+"""The hand that throws, frame by frame: sharper by the markers that it carries than its joint of a solved motion; how
+the ball lies in it and goes with it, and a first guess of when it leaves.
 
 A solved motion is filtered, which takes off the very peak that a throw is about; the hand's markers are not. Where at
 least three markers near the wrist are seen, the hand's frame is the one that carries them (eq. 3.14), else the
