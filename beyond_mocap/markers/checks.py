@@ -18,7 +18,7 @@ from ..base.runs import runs
 from .files.unit_and_axes import handedness
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
-from .trial import MarkerTrial
+from .trial import MarkerTrial, list_some
 
 _MIRRORED = -0.5
 _OFF = 0.012  # metres by which a distance may differ, beside half of what it does in the trial itself
@@ -57,7 +57,7 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
     lacking = [label for label in trial.labels if label not in static.labels]
     if not lacking:
         return []
-    told = some(lacking)
+    told = list_some(lacking)
     if len(lacking) > _LACKING * len(trial.labels):
         raise InputError(
             static.name,
@@ -67,16 +67,11 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
     return [f"{static.name} lacks {told}: where these lie is told by the motion"]
 
 
-def some(labels: Sequence[str]) -> str:
-    """The first of many labels."""
-    return ", ".join(labels[:6]) + (f" and {len(labels) - 6} more" if len(labels) > 6 else "")
-
-
 def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Sequence[str] = ()) -> list[str]:
     """A line on the named markers that lie on no segment; others: those known to be on no body."""
     known = {label for group in clusters.values() for label in group} | set(others)
     left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
-    return [f"{len(left)} markers of no segment are not used: {some(left)}"] if left else []
+    return [f"{len(left)} markers of no segment are not used: {list_some(left)}"] if left else []
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:

@@ -16,7 +16,7 @@ from ..motion.motion import Motion
 from .cleaning.clean import Cleaned, clean
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, Solved, solve
-from .trial import MarkerTrial
+from .trial import MarkerTrial, evenly, list_some
 
 _DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
@@ -220,12 +220,12 @@ def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> di
 
 def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
     """Whether the markers are mirrored, or those of somebody else than the static's."""
-    from .checks import check, some, unused
+    from .checks import check, unused
 
     clusters = clusters_of(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
     lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
-    gone = [f"of the set {marker_set.name} there is no {some(lacking)}"] if lacking else []
+    gone = [f"of the set {marker_set.name} there is no {list_some(lacking)}"] if lacking else []
     return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
 
 
@@ -242,8 +242,6 @@ def modelled(trial: MarkerTrial, static: MarkerTrial | None, settings: Reconstru
 
 def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """The trial under the set's names, its frames on even times."""
-    from .trial import evenly
-
     return evenly(named_by(trial, marker_set))
 
 
@@ -253,7 +251,6 @@ def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Clean
 
 
 def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
-    from .checks import some
     from .model.calibrate import calibrate
 
     try:
@@ -262,19 +259,15 @@ def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
         lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
         if not lacking:
             raise
-        raise InputError(still.name, f"{error}; it lacks {some(lacking)}") from None
+        raise InputError(still.name, f"{error}; it lacks {list_some(lacking)}") from None
 
 
 def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
-    from .checks import some
-
     lacking = [label for label in model.markers if label not in trial.labels]
     if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
-        raise InputError(
-            trial.name,
-            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some(lacking)}",
-            "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
-        )
+        found = f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers"
+        raise InputError(trial.name, f"{found}, not {list_some(lacking)}", "a trial with the model's markers",
+                         "choose another model, or the marker set whose labels these are")
 
 
 def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:

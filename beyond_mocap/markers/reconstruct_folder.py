@@ -8,6 +8,7 @@ without a static are modelled from their own motion.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -145,13 +146,8 @@ def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
         except InputError as error:
             note = f"goes without a static: {error}"
             continue
-        fits.append((_alike(recording.path.stem, one.path.stem), shared, (recording, static)))
+        fits.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
     return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
-
-
-def _alike(a: str, b: str) -> int:
-    """How many letters two names begin with in common."""
-    return next((i for i, (x, y) in enumerate(zip(a, b)) if x != y), min(len(a), len(b)))
 
 
 def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Path, MarkerModel]:

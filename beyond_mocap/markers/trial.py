@@ -7,7 +7,7 @@ Some systems expose at whole milliseconds and write the nominal rate (`frame_tim
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -140,6 +140,12 @@ class MarkerTrial:
         """The trial with other places, (T, M, 3) m; residuals stay where the frames are as many, and go otherwise."""
         keeps = self.residuals is not None and np.shape(positions)[:2] == self.residuals.shape
         return replace(self, positions=positions, residuals=self.residuals if keeps else None)
+
+
+def list_some(names: Sequence[str], most: int = 6) -> str:
+    """The first of many names, and how many more there are."""
+    shown = ", ".join(name or "(no name)" for name in names[:most])
+    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def repeated(labels: Iterable[str]) -> list[str]:

@@ -143,7 +143,7 @@ def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
     return out
 
 
-def is_near_mean(points: np.ndarray) -> np.ndarray:
+def near_mean(points: np.ndarray) -> np.ndarray:
     """(N,) bool: the points (N, 2) within three standard deviations of their mean on both axes; NaN are not kept."""
     known = np.isfinite(points).all(axis=-1)
     if np.count_nonzero(known) < 3:

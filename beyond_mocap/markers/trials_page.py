@@ -17,16 +17,7 @@ import numpy as np
 
 from ..evaluation import html_page as html
 from ..evaluation.plots import plain
-from .trial_results import (
-    LEAST,
-    Paired,
-    TrialResult,
-    aligned_impacts,
-    compare_speeds,
-    dominant_sides,
-    is_near_mean,
-    read_results,
-)
+from .trial_results import LEAST, TrialResult, aligned_impacts, compare_speeds, dominant_sides, near_mean, read_results
 
 DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
 _WIDTH, _DPI = 11.0, 100
@@ -62,7 +53,7 @@ def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
         return []
     parts = []
     points = aligned_impacts(thrown)
-    near = is_near_mean(points)
+    near = near_mean(points)
     if near.any():
         said = f"{int(near.sum())} of {len(thrown)} throws; those beyond three standard deviations are left out."
         parts.append(_section("Where throws land", html.element("p", said), draw_impact_map(points[near]),
@@ -70,12 +61,12 @@ def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
     pairs = [(r.throw.radar, r.throw.speed) for r in thrown if r.throw.radar]
     if pairs:
         measured, estimated = np.array(pairs, float).T
-        said = _paired_text(compare_speeds(estimated, measured))
-        parts.append(_section("How fast they are", said, draw_speeds(measured, estimated)))
+        parts.append(_section("How fast they are", _speed_text(estimated, measured), draw_speeds(measured, estimated)))
     return parts
 
 
-def _paired_text(found: Paired) -> html.Html:
+def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
+    found = compare_speeds(estimated, measured)
     many = "throws" if found.count != 1 else "throw"
     lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
              + (f" (standard deviation {found.sd:.2f})" if np.isfinite(found.sd) else "")

@@ -268,16 +268,14 @@ def _opposite(work):
 
 
 def _jumps(work):
-    positions, found = take_out(work.positions, work.carried, work.trial.fps)
-    work.positions = positions
+    work.positions, found = take_out(work.positions, work.carried, work.trial.fps)
     work.found["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
         work.look_again([jump.marker for jump in found])
 
 
 def _names(work):
-    positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
-    work.positions = positions
+    work.positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
     work.found["assigned"] = tuple(
         work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
@@ -288,8 +286,8 @@ def _names(work):
 def _gaps(work, settings):
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
-    filled, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried, ask=work.ask)
-    work.positions = filled
+    work.positions, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried,
+                                 ask=work.ask)
     for name, kept in (("gaps", True), ("left", False)):
         work.found[name] = tuple(
             work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is kept

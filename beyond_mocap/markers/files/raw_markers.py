@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import MarkerEvent, MarkerTrial
+from ..trial import MarkerEvent, MarkerTrial, list_some
 from .unit_and_axes import decide_unit, handedness, read_given_unit, tall, up_axis
 
 _WILD = 1e9  # in any unit
@@ -83,7 +83,8 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     if residuals is not None:
         residuals = np.where(np.isfinite(positions).all(axis=-1), residuals * metres, np.nan)
         residuals = residuals if np.nanmax(residuals, initial=0) > 0 else None
-    _tell_mirrored(labels, positions, notes)
+    if handedness(labels, positions) < -0.5:
+        notes.append("the body is mirrored: its coordinates are left-handed, or left and right labels are exchanged")
     return MarkerTrial(labels=tuple(labels), positions=positions, fps=raw.fps, residuals=residuals,
                        events=_events(raw, whose), start=raw.start, name=Path(path).stem, subject=whose,
                        notes=tuple(notes))  # fmt: skip
@@ -100,7 +101,7 @@ def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str]
     points = [i for i, (name, label) in enumerate(parted) if label not in dropped[name]]
     if len(points) < len(parted):
         some = list(dict.fromkeys(label for name, label in parted if label in dropped[name]))
-        notes.append(f"{len(parted) - len(points)} computed points left out: {_few(some)}")
+        notes.append(f"{len(parted) - len(points)} computed points left out: {list_some(some)}")
     if not points:
         raise InputError(path, "no markers", "points that are markers", "export the trial with its markers")
     counts: dict[str, int] = {}
@@ -110,12 +111,12 @@ def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str]
     kept = [i for i in points if parted[i][0] in ("", whose) or counts[parted[i][0]] < FEWEST_OF_A_BODY]
     labels = [parted[i][1] if parted[i][0] in ("", whose) else ":".join(parted[i]) for i in kept]
     if others := [name for name in counts if name not in ("", whose)]:
-        notes.append(f"subject {whose or 'without a name'!r} of {_few(list(counts))}")
+        notes.append(f"subject {whose or 'without a name'!r} of {list_some(list(counts))}")
         if objects := [name for name in others if counts[name] < FEWEST_OF_A_BODY]:
-            notes.append(f"markers of {_few(objects)} kept under their own names")
+            notes.append(f"markers of {list_some(objects)} kept under their own names")
     labels, twice = make_unique(labels)
     if twice:
-        notes.append(f"labels that came twice, numbered: {_few(twice)}")
+        notes.append(f"labels that came twice, numbered: {list_some(twice)}")
     return kept, labels, whose
 
 
@@ -125,7 +126,7 @@ def _seen_only(path, labels, positions, residuals, notes):
     if not ever.any():
         raise InputError(path, f"{len(labels)} markers, none of them ever seen", "places of markers", "export it again")
     if not ever.all():
-        notes.append(f"never seen: {_few([label for label, seen in zip(labels, ever) if not seen])}")
+        notes.append(f"never seen: {list_some([label for label, seen in zip(labels, ever) if not seen])}")
     labels = [label for label, seen in zip(labels, ever) if seen]
     return labels, positions[:, ever], None if residuals is None else residuals[:, ever]
 
@@ -144,11 +145,6 @@ def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np
     return positions[..., axes] * np.array(signs, dtype=float)
 
 
-def _tell_mirrored(labels, positions, notes) -> None:
-    if handedness(labels, positions) < -0.5:
-        notes.append("the body is mirrored: its coordinates are left-handed, or left and right labels are exchanged")
-
-
 def _events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
     return tuple(MarkerEvent(seconds, label, side) for seconds, label, side, name in raw.events
                  if not name or not whose or name == whose)  # fmt: skip
@@ -164,11 +160,6 @@ def axis_named(name: str) -> tuple[int, int]:
 
 def _axis(up: tuple[int, int]) -> str:
     return ("-" if up[1] < 0 else "") + "XYZ"[up[0]]
-
-
-def _few(names, most: int = 6) -> str:
-    names = [name or "(no name)" for name in names]
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def split_label(label: str, prefixes: Iterable[str] = ()) -> tuple[str, str]:

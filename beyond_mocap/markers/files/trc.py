@@ -94,7 +94,7 @@ def _head(path: Path, lines: list[str]) -> _Head:
     if at is None:
         raise InputError(f"{path}:1", "no line that begins with Frame#", "the head of a TRC file", "choose a TRC file")
     tabs = "\t" in lines[at]
-    below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"[XYZ]\d+$", _first(lines[i]))), None)
+    below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"\s*[XYZ]\d+(\s|$)", lines[i])), None)
     named = _cells(lines[at], tabs)
     labels, starts = _labels(path, named, at, tabs)
     if below is not None:
@@ -111,11 +111,6 @@ def _head(path: Path, lines: list[str]) -> _Head:
     columns = np.array(starts)[:, None] + np.array(order)
     return _Head(labels=labels, columns=columns, first_row=(at if below is None else below) + 1, values=values,
                  tabs=tabs, notes=notes)
-
-
-def _first(line: str) -> str:
-    words = line.split()
-    return words[0] if words else ""
 
 
 def _cells(line: str, tabs: bool) -> list[str]:
@@ -214,10 +209,9 @@ def _number(path: Path, cell: str, line: int, column: int) -> float:
     if cell.lower() in _MISSING:
         return math.nan
     try:
-        value = float(cell if "." in cell else cell.replace(",", "."))
+        return float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
         raise InputError(f"{path}:{line}", f"{cell[:40]!r} in column {column}", "a number", "mend it") from None
-    return value
 
 
 # -- time
@@ -234,7 +228,8 @@ def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarr
         told = [] if len(times) < 2 else ["no times in the file: frames follow one another at DataRate"]
         return said, 0.0 if not np.isfinite(seconds[:1]).all() else float(seconds[0]), positions, told
     steps = np.diff(seconds)
-    if (steps <= 0).any() and not _only_coarse(steps, coarse, said):
+    only_coarse = bool((steps >= 0).all()) and said > 0 and 1 / said < coarse  # equal times, of few digits
+    if (steps <= 0).any() and not only_coarse:
         frame = int(np.argmax(steps <= 0)) + 2
         found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
         raise InputError(path, found, "times that grow", "one recording a file")
@@ -264,11 +259,6 @@ def _seconds(times: list[str]) -> tuple[np.ndarray, float]:
     digits = max((len(text.partition(".")[2]) for text in texts[:100] if "e" not in text.lower()), default=6)
     seconds = np.array([value(text) for text in texts])
     return np.where(np.abs(seconds) < 1e7, seconds, np.nan), 10.0 ** -digits
-
-
-def _only_coarse(steps: np.ndarray, coarse: float, said: float) -> bool:
-    """Whether equal times follow from few digits."""
-    return bool((steps >= 0).all()) and said > 0 and 1 / said < coarse
 
 
 def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) -> tuple[float, list[str]]:

@@ -41,20 +41,8 @@ _UNTOLD = 0.001  # m: what no motion can tell stays as predicted
 _FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
 _LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
 """Bones that lie exactly along an axis: joint at their end -> axis."""
-
-
-# Which frames of a motion a model is made from: upright ones, and ones as unlike as can be.
-
-
-_CANDIDATES = 400
-
-
-# Markers that the static trial, or the frames that a model began with, did not show: placed where the motion has
-# them.
-
-
-_FRAMES = 40
-_FEWEST = 3  # frames in which a marker has to be seen
+_CANDIDATES = 400  # frames of a motion of which those are chosen that are as unlike as can be
+_FRAMES, _FEWEST = 40, 3  # frames that place a marker that was not shown at first, and in which it has to be seen
 
 
 def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial,
@@ -112,7 +100,9 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
         names = [f"{side}_asis", f"{side}_knee_lateral", f"{side}_ankle_lateral"]
         if all(name in at for name in names):
             hip, knee, ankle = (at[name] for name in names)
-            cost += np.nan_to_num(1.0 - _cosine(hip - knee, knee - ankle), nan=1.0) * 2.0
+            length = np.linalg.norm(hip - knee, axis=-1) * np.linalg.norm(knee - ankle, axis=-1)
+            cosine = np.sum((hip - knee) * (knee - ankle), axis=-1) / np.maximum(length, 1e-9)
+            cost += np.nan_to_num(1.0 - cosine, nan=1.0) * 2.0
             cost += np.nan_to_num(np.maximum(_tilt(knee - ankle) - 0.1, 0.0), nan=0.5)
     if "c7" in at and "left_asis" in at and "right_asis" in at:
         cost += np.nan_to_num(_tilt(at["c7"] - 0.5 * (at["left_asis"] + at["right_asis"])), nan=0.5)
@@ -124,11 +114,6 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
         if all(abs(int(frame) - other) >= apart for other in chosen):
             chosen.append(int(frame))
     return chosen
-
-
-def _cosine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
-    return np.sum(a * b, axis=-1) / np.maximum(length, 1e-9)
 
 
 def _tilt(v: np.ndarray) -> np.ndarray:
@@ -228,16 +213,15 @@ def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
     return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
 
 
-def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
-            cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
-            place_sigma: float = _PLACE_SIGMA) -> MarkerModel:
+def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
+            cancelled: Callable[[], bool]) -> MarkerModel:
     """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
-    part = _chosen(model, trial, static, frames)
+    part = _chosen(model, trial, static)
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
     body = _body(model)
-    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen=seen_markers(model, part),
-                      sigma=_sigmas(model), worth=worth)
+    task = Adjustment(body, _prior(model), _pull(model), seen=seen_markers(model, part),
+                      sigma=np.maximum(model.sigma, 0.004), worth=_WORTH)
     task.start(motion)
     for _ in range(2):
         if cancelled():
@@ -250,14 +234,14 @@ def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None =
                    edge_sigma=cluster_deviation(model.joint, deviation))
 
 
-def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, count: int) -> MarkerTrial:
+def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) -> MarkerTrial:
     """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
 
     They are no neighbours in time, which the rate of one frame a second tells whoever solves them.
     """
     root = [i for i, label in enumerate(trial.labels) if label in model.markers
             and model.joint[model.markers.index(label)] == 0]
-    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
+    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), FRAMES)]
     if static is not None:
         still = seen_markers(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
         positions = np.concatenate([still, positions])
@@ -276,22 +260,18 @@ def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
     return kept, part.with_positions(part.positions[good])
 
 
-def _part(name: str) -> str:
-    return name.removeprefix("Left").removeprefix("Right")
-
-
 def _body(model: MarkerModel) -> Body:
     names = model.skeleton.names
-    limb = np.array([_LIMBS.get(_part(name), -1) for name in names])
+    limb = np.array([_LIMBS.get(name.removeprefix("Left").removeprefix("Right"), -1) for name in names])
     held = ~model.freedom.free.any(axis=1)
     return Body(names=names, parents=model.skeleton.parents, offsets=model.skeleton.offsets.copy(), joint=model.joint,
                 places=model.places.copy(), held=held, limb=limb)
 
 
-def _prior(model: MarkerModel, place_sigma: float) -> Prior:
+def _prior(model: MarkerModel) -> Prior:
     sigma = np.maximum(model.centre_sigma, 0.003)
     above = sigma[np.maximum(model.skeleton.parents, 0)]
-    places = np.full(len(model.joint), place_sigma)
+    places = np.full(len(model.joint), _PLACE_SIGMA)
     held = ~model.freedom.free.any(axis=1)
     offsets = np.where(held, _UNTOLD, np.sqrt(sigma**2 + above**2))
     return Prior(offsets=model.skeleton.offsets.copy(), offset_sigma=offsets, places=model.places.copy(),
@@ -314,10 +294,6 @@ def _pull(model: MarkerModel) -> Pull:
     freedom = model.freedom
     runs = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free).runs
     return Pull(play, runs)
-
-
-def _sigmas(model: MarkerModel) -> np.ndarray:
-    return np.maximum(model.sigma, 0.004)
 
 
 def _scatter(residuals: np.ndarray) -> np.ndarray:

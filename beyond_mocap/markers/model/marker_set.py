@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import MarkerTrial
+from ..trial import MarkerTrial, list_some
 from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
@@ -131,8 +131,9 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     missing = sorted(nearest.needed - present)
     unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
     raise InputError(
-        "markers", f"no marker set fits; nearest is {nearest.name}, of which {_some(missing)} missing"
-        + (f" ({_some(unknown, 'not in it')})" if unknown else ""),
+        "markers", f"no marker set fits; nearest is {nearest.name}, of which "
+        + f"{list_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
+        + (f" ({list_some(unknown, 8)} not in it)" if unknown else ""),
         "all markers of one set", "give a marker set of your own (--marker-set)",
     )
 
@@ -144,13 +145,6 @@ def _present(marker_set: MarkerSet, labels: Sequence[str]) -> set[str]:
 
 def _plain(label: str) -> str:
     return re.sub(r"[\s_\-.]", "", label).lower()
-
-
-def _some(names: Sequence[str], what: str = "") -> str:
-    """`4 are: A, B, C and 1 more`, or with `what` in place of `are`."""
-    shown = ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
-    verb = what or ("is" if len(names) == 1 else "are")
-    return f"{shown} {verb}"
 
 
 def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:

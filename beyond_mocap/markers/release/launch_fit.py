@@ -185,7 +185,7 @@ class _Search:
         it meets; and its release time."""
         end = t0 + seconds
         for turn in range(4):
-            self.air = self._air_of(flight, t0)
+            self.air = _air(self.times, t0, flight.velocity, self._turning(flight, t0)[0], self.ball)
             rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
             flight = self.flight(t0, end, rates) or flight
             width = max(width / 5.0, 0.05)
@@ -193,10 +193,6 @@ class _Search:
             tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
             flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
         return flight, t0
-
-    def _air_of(self, flight: _Flight, t0: float) -> np.ndarray:
-        spin, _, _ = self._turning(flight, t0)
-        return _air(self.times, t0, flight.velocity, spin, self.ball)
 
     def _turning(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Spin (3,) rad/s, offset (3,) m of the marker from the centre, and the centre (3,) m, at the release.

@@ -23,7 +23,7 @@ from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
 from ..trial import MarkerTrial, evenly
 from .launch_fit import Held, fit_launch
-from .throwing_hand import HandBall, ball_in_hand, by_distance, carried_and_thrown, fastest, sharpened, speeds
+from .throwing_hand import HandBall, ball_in_hand, by_distance, fastest, place_ball, sharpened, speeds, steady_speeds
 from .without_ball import HOLD, release_by_hand
 
 FEWEST = 12
@@ -141,7 +141,8 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     label = _ball_label(even, settings.ball_marker)
     marker = None if label is None else even.positions[:, even.index(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
-    hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
+    balls = tuple(name for name in even.labels if name == label or _BALL_LABEL.match(name))
+    hands = [sharpened(hand_of(motion, side), even, balls) for side in sides]
     hand = _throwing(hands, marker)
     _check_throws(hand, even.name)
     lies, notes = _in_hand(hand, marker, settings, ball)
@@ -177,7 +178,7 @@ def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings:
 
 def _check_throws(hand: Hand, name: str) -> None:
     """InputError where the hand is never fast enough to throw."""
-    pace = float(np.max(_steady(hand)))
+    pace = float(np.max(steady_speeds(hand.origin, hand.fps)))
     if pace < SLOWEST:
         raise InputError(name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw",
                          "choose another trial, or the other hand")
@@ -228,7 +229,7 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     launch = replace(found.launch, position=found.launch.position - hand.shift)
     home = replace(hand, origin=hand.origin - hand.shift)
     ground = ground_height(motion)
-    places = carried_and_thrown(home, lies.centre, launch, found.ball, ground)
+    places = place_ball(home, lies.centre, launch, found.ball, ground)
     way = fly(launch, found.ball, _LONGEST, ground)
     impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
@@ -246,16 +247,12 @@ def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
     if abs(motion.fps - trial.fps) > 0.01 * trial.fps:
         other = resample(motion, trial.fps)
         if abs(len(other) - len(trial)) <= max(2.0 * trial.fps / motion.fps, 2.0):
-            return _as_long(other, len(trial))
+            at = np.minimum(np.arange(len(trial)), len(other) - 1)
+            return Motion(other.skeleton, other.root_positions[at], other.rotations[at], other.fps)
     raise InputError(
         trial.name, f"{len(trial)} frames at {trial.fps:g} per second, and a motion of {len(motion)} at {motion.fps:g}",
         "the motion that was made from this trial", "reconstruct the trial first",
     )  # fmt: skip
-
-
-def _as_long(motion: Motion, count: int) -> Motion:
-    at = np.minimum(np.arange(count), len(motion) - 1)
-    return Motion(motion.skeleton, motion.root_positions[at], motion.rotations[at], motion.fps)
 
 
 def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
@@ -269,10 +266,6 @@ def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
     return max(named, key=lambda label: np.count_nonzero(trial.seen[:, trial.index(label)]))
 
 
-def _ball_labels(trial: MarkerTrial, label: str | None) -> tuple[str, ...]:
-    return tuple(name for name in trial.labels if name == label or _BALL_LABEL.match(name))
-
-
 def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     """The hand in which the ball's marker is before it flies; without a marker the faster one."""
     peaks = [fastest(hand.origin, hand.fps) for hand in hands]
@@ -281,13 +274,6 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
         return hands[fast]
     nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
     return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _REACHES else hands[fast]
-
-
-def _steady(hand: Hand) -> np.ndarray:
-    """(T,) m/s, of which single frames that are off are taken out."""
-    from scipy.signal import medfilt
-
-    return medfilt(speeds(hand.origin, hand.fps), 5)
 
 
 def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
@@ -300,7 +286,9 @@ def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
 
 def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
     """Where the ball lies in the hand, and what is to be told of it."""
-    usual = usual_centre(hand.finger, hand.reach, _palm(hand))
+    # out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise
+    palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
+    usual = usual_centre(hand.finger, hand.reach, palm)
     radius = settings.radius or ball.radius
     if settings.centre is not None:
         return HandBall(np.array(settings.centre, float), radius, 0.005), []
@@ -310,11 +298,6 @@ def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple
     lies = ball_in_hand(hand.taken_back(marker)[held], radius, usual, fit_radius=settings.radius is None)
     told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm by its marker"] if lies.fitted else []
     return lies, told
-
-
-def _palm(hand: Hand) -> np.ndarray | None:
-    """Out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise."""
-    return np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
 
 
 def _held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
@@ -339,9 +322,11 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
+    # without air as eq. 6.2 has it; which of both is nearer to what was seen is taken
+    without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
     fits = [(fit_launch(marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius,
                         window=settings.window), air)
-            for air in (ball, _without_air(ball))]
+            for air in (ball, without_air)]
     if fits[0][0] is None or fits[1][0] is None:
         return None
     fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
@@ -353,11 +338,6 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
     return _Found(launch=launch, ball=ball, how="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
                   way_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
-
-
-def _without_air(ball: Ball) -> Ball:
-    """As eq. 6.2 has it; which of both is nearer to what was seen is taken."""
-    return replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
 
 
 def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:

@@ -146,7 +146,7 @@ def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radiu
     points = points[np.isfinite(points).all(axis=-1)]
     if not len(points):
         return HandBall(np.asarray(usual, float), radius, _USUAL_SIGMA)
-    places = _places(points)
+    places = points[:: max(len(points) // 400, 1)]  # neighbours in time say the same
     spread = float(np.median(np.linalg.norm(places - np.median(places, axis=0), axis=-1)))
     found = None
     if fit_radius and len(places) >= 4 and spread > _LEAST_SPREAD * radius:
@@ -159,7 +159,9 @@ def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radiu
 
 def _fitted(places: np.ndarray, radius: float, usual: np.ndarray, fitted: bool) -> HandBall:
     """Gauss-Newton from the usual side."""
-    value = np.append(_start(places, radius, usual), radius)
+    mean = places.mean(axis=0)
+    toward = np.asarray(usual, float) - mean  # on this side of the markers' mean the usual centre is
+    value = np.append(mean + toward * (radius / max(np.linalg.norm(toward), 1e-9)), radius)
     pull = np.append(np.full(3, 1.0 / _USUAL_SIGMA**2), 0.0)
     for _ in range(_ROUNDS):
         arms = value[:3] - places
@@ -177,19 +179,7 @@ def _fitted(places: np.ndarray, radius: float, usual: np.ndarray, fitted: bool) 
     return HandBall(value[:3], float(value[3]), sigma, fitted)
 
 
-def _places(points: np.ndarray) -> np.ndarray:
-    """At most some hundred of the points, evenly taken: neighbours in time say the same."""
-    return points[:: max(len(points) // 400, 1)]
-
-
-def _start(places: np.ndarray, radius: float, usual: np.ndarray) -> np.ndarray:
-    """On the side of the markers' mean on which the usual centre is."""
-    mean = places.mean(axis=0)
-    toward = np.asarray(usual, float) - mean
-    return mean + toward * (radius / max(np.linalg.norm(toward), 1e-9))
-
-
-def carried_and_thrown(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, ground: float = 0.0) -> np.ndarray:
+def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, ground: float = 0.0) -> np.ndarray:
     """(T, 3) m: the ball's centre in every frame of the hand.
 
     centre: (3,) m, where the ball lies in the hand's frame. launch: how it leaves, s from frame 0. Shortly before, the
@@ -224,11 +214,16 @@ def speeds(places: np.ndarray, fps: float) -> np.ndarray:
     return np.linalg.norm(np.gradient(places, 1.0 / fps, axis=0), axis=-1)
 
 
-def fastest(places: np.ndarray, fps: float) -> int:
-    """The frame in which a point (T, 3) m is fastest, single outliers left aside."""
+def steady_speeds(places: np.ndarray, fps: float) -> np.ndarray:
+    """`speeds`, of which single frames that are off are taken out."""
     from scipy.signal import medfilt
 
-    return int(np.argmax(medfilt(speeds(places, fps), 5)))
+    return medfilt(speeds(places, fps), 5)
+
+
+def fastest(places: np.ndarray, fps: float) -> int:
+    """The frame in which a point (T, 3) m is fastest, single outliers left aside."""
+    return int(np.argmax(steady_speeds(places, fps)))
 
 
 def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:

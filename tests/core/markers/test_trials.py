@@ -12,7 +12,7 @@ from beyond_mocap.markers.trial_results import (
     aligned_impacts,
     compare_speeds,
     dominant_sides,
-    is_near_mean,
+    near_mean,
     read_results,
 )
 from beyond_mocap.markers.trials_page import trials_report
@@ -110,7 +110,7 @@ def test_impacts_are_aligned_to_each_subjects_throws():
 
 def test_far_throws_are_culled():
     points = np.concatenate([np.random.default_rng(0).normal(0.0, 1.0, (40, 2)), [[30.0, 0.0], [np.nan, 0.0]]])
-    assert is_near_mean(points)[:40].all() and not is_near_mean(points)[40:].any()
+    assert near_mean(points)[:40].all() and not near_mean(points)[40:].any()
 
 
 def test_the_dominant_arm_is_the_one_that_throws_more():
