@@ -22,8 +22,7 @@ _DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
 RELEASES = setting("markers", "release").choice_names
 _SMOOTHNESS = setting("markers", "smoothness")
-LEAST_MARKERS = 0.5
-"""Share of a model's markers that a trial must have."""
+LEAST_MARKERS = 0.5  # share of a model's markers that a trial must have
 _TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 

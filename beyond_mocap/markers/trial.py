@@ -17,8 +17,7 @@ from ..base.errors import InputError
 
 FEWEST_FPS, MOST_FPS = 1.0, 20000.0
 
-TICK = 1e-3
-"""Seconds: the clock that the exposures are bound to."""
+TICK = 1e-3  # seconds: the clock that the exposures are bound to
 _SMOOTH = 19  # frames over which a marker's step is smoothed, several times the pattern's length
 _LEAST_ALIKE = 0.8  # correlation of the markers' common unsteadiness with the clock's
 _PHASES = 36

@@ -14,11 +14,9 @@ from ..base.errors import InputError
 from ..base.vectors import unit_vector, unit_vectors
 from ..evaluation.report import check_depth
 
-CULLED = 3.0
-"""Standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)."""
+CULLED = 3.0  # standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)
 
-LEAST = 6
-"""Pairs below which Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)."""
+LEAST = 6  # pairs below which Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -17,8 +17,7 @@ from ..model.model import BallMarker, Freedom, MarkerModel
 from ..trial import repeated
 
 VERSION = 1
-LARGEST = 10_000_000
-"""Bytes of a file above which it is no model."""
+LARGEST = 10_000_000  # bytes of a file above which it is no model
 _PAGE = "docs/markers/markers.md"
 _TRIPLE = "[x, y, z] in metres"
 _FARTHEST = 100.0  # metres within a body

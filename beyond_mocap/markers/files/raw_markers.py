@@ -21,8 +21,7 @@ _UP = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1)
        (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
 """What points up in the file, (axis, sign) -> which of its axes ours are, and their signs: turned, never mirrored."""
 
-FEWEST_OF_A_BODY = 10
-"""Markers below which a subject of a file is taken for an object."""
+FEWEST_OF_A_BODY = 10  # markers below which a subject of a file is taken for an object
 
 _COMPUTED = re.compile(
     r"(Angles?V?|Force|Moment|Power|GRF|CentreOfMass(Floor)?|CenterOfMass(Floor)?|^CoM(Floor)?|GroundReaction\w*"

@@ -27,8 +27,7 @@ from .marker_set import MarkerSet
 from .model import MarkerModel, freedom_of
 from .template import JOINTS, PARENTS, SCAPULAE
 
-SIGMA = 0.008
-"""How far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)."""
+SIGMA = 0.008  # how far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)
 
 _STILL = 0.1  # nobody who stands still moves faster than this, m/s (median of the markers over a second)
 
@@ -48,30 +47,23 @@ def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> d
 
 def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "",
                      session: str = "") -> MarkerModel:
-    """The model that one frame gives, with predicted joint centres.
+    """The model that one frame gives, with predicted joint centres, on which each marker lies where it was seen.
 
     frame: label -> (3,) m, Z up, NaN where not seen. standing: whether it is a static trial's frame. InputError where
     too few landmarks are marked.
     """
     centres = predict(landmark_places(frame, marker_set), standing)
     carried = {label: marker_set.segment_of(label) for label in frame if np.isfinite(frame[label]).all()}
-    return model_from_centres(centres, frame, carried, marker_set=marker_set, subject=subject, session=session)
-
-
-def model_from_centres(centres: Centres, frame: Mapping[str, np.ndarray], carried: Mapping[str, str | None],
-                       marker_set: MarkerSet, subject: str = "", session: str = "") -> MarkerModel:
-    """The model with these joint centres and axes, on which each marker of the frame lies where it was seen."""
     names = _joint_names(centres, set(carried.values()))
     skeleton, axes, places = _skeleton(centres, names)
     labels, joints, on = [], [], []
     for label in marker_set.labels:
         joint = carried.get(label)
-        if joint is None or joint not in names:
-            continue
-        index = names.index(joint)
-        labels.append(label)
-        joints.append(index)
-        on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
+        if joint in names:
+            index = names.index(joint)
+            labels.append(label)
+            joints.append(index)
+            on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
     if not labels:
         raise InputError("model", "no marker on any joint", "markers of the set", "check labels and marker set")
     counts = {name: joints.count(index) for index, name in enumerate(names)}

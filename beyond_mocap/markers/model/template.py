@@ -110,8 +110,7 @@ def _both(table):
 _PARENTS, _PLACES = _joints()
 PARENTS = MappingProxyType(_PARENTS)
 """Joint -> the joint above it, None for the root; parents stand first. Scapulae are left out of most skeletons."""
-JOINTS = tuple(PARENTS)
-"""All joints that a segment may be carried by, parents first."""
+JOINTS = tuple(PARENTS)  # all joints that a segment may be carried by, parents first
 PLACES = MappingProxyType({name: np.array(place) for name, place in _PLACES.items()})
 """Joint -> its place (3,) m in the T-pose of the typical body, from the middle between the hips."""
 TIPS = MappingProxyType({name: np.array(place) for name, place in _both(_TIPS).items()})

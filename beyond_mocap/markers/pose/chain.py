@@ -26,7 +26,8 @@ from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.skeleton import Skeleton
 
-_AXES = {"X": 0, "Y": 1, "Z": 2}
+AXES = {"X": 0, "Y": 1, "Z": 2}
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])[:, None]  # times a quaternion (..., 4, F): its inverse
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -219,9 +220,9 @@ def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     turned = np.broadcast_to(np.eye(3)[:, :, None], out.shape)
     for angle, letter in enumerate(chain.order[joint]):
         if chain.free[joint, angle]:
-            out[:, angle] = turned[:, _AXES[letter]]
+            out[:, angle] = turned[:, AXES[letter]]
         one = np.zeros((4, angles.shape[-1]))
-        one[0], one[1 + _AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
+        one[0], one[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
         turned = np.einsum("abf,bcf->acf", turned, matrices(one))
     return out
 

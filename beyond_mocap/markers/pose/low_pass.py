@@ -25,10 +25,8 @@ from ...base.settings import setting
 from ...motion import quaternion
 from ...motion.motion import Motion
 
-CUTOFF = setting("markers", "cutoff").default
-"""Hertz; Fredriksson §5.4."""
-LEAST_RATE = 2.2
-"""Frames per second for each hertz of cutoff: below twice the cutoff there is nothing to filter out."""
+CUTOFF = setting("markers", "cutoff").default  # hertz; Fredriksson §5.4
+LEAST_RATE = 2.2  # frames per second for each hertz of cutoff: below twice the cutoff there is nothing to filter out
 
 _EACH_PASS = (2.0**0.5 - 1.0) ** 0.25  # a pass's cutoff is the asked one divided by this, on the bilinear scale
 _PADDED = 2.0  # periods of the cutoff by which both ends are continued before the passes

@@ -20,8 +20,7 @@ import numpy as np
 from ...ball.physics import Ball, in_air
 from ...base.time_series import interpolate
 
-FASTEST_SPIN = 2.0 * np.pi * 50.0
-"""rad/s: 3000 turns a minute, the most that pitched baseballs have."""
+FASTEST_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 turns a minute, the most that pitched baseballs have
 _RATES = 60
 _LEAST = 2  # frames of flight
 _FIRST = 0.11  # s of flight with which release and spin are searched; the rest follows from there

@@ -26,10 +26,8 @@ from .launch_fit import Held, fit_launch
 from .throwing_hand import HandBall, ball_in_hand, by_distance, fastest, place_ball, sharpened, speeds, steady_speeds
 from .without_ball import HOLD, release_by_hand
 
-FEWEST = 12
-"""Frames without which no throw is looked for."""
-SLOWEST = 1.5
-"""m/s: a hand that is never faster throws nothing."""
+FEWEST = 12  # frames without which no throw is looked for
+SLOWEST = 1.5  # m/s: a hand that is never faster throws nothing
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
 _NEARBY = 0.3  # s before a hand is fastest: the ball is in it
@@ -41,8 +39,7 @@ _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
 
 MPH, KMH = 0.44704, 1.0 / 3.6
-SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0
-"""m/s: what a ball out of a hand can have; a number outside is something else."""
+SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0  # m/s: what a ball out of a hand can have; a number outside is something else
 
 # pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
 _PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")

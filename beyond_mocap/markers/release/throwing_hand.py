@@ -22,8 +22,7 @@ from ...motion.hand import Hand
 from ..frames import rigid_fit
 from ..trial import MarkerTrial
 
-NEAR = 0.14
-"""m from the wrist within which a marker belongs to the hand."""
+NEAR = 0.14  # m from the wrist within which a marker belongs to the hand
 _PASSES = 4
 _LIFTS = sorted(np.arange(-40, 41) / 100.0, key=abs)  # m
 _BEHIND = 0.02  # m nearer to the elbow than the wrist is, where the forearm's markers begin
@@ -41,8 +40,7 @@ _ROUNDS = 40
 _SETTLES = 0.10  # s before the release from which on the ball moves from its usual place to where it leaves
 _FOLLOWED = 10.0  # s of flight, bounces and rolling at most
 
-GROWS = 1.1
-"""The ball has left once its marker is that much further from the hand than while held (Fredriksson §6.2)."""
+GROWS = 1.1  # the ball has left once its marker is that much further from the hand than while held (Fredriksson §6.2)
 _BEFORE = (0.30, 0.05)  # s before the hand is fastest: the ball is held there
 _STAYS = 3  # frames for which it is further away
 
