@@ -16,6 +16,7 @@ from ..motion.motion import Motion
 from .cleaning.clean import Cleaned, clean
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, Solved, solve
+from .pose.residuals import floor_under, seen_markers
 from .trial import MarkerTrial, evenly, list_some
 
 _DEFAULTS = defaults("markers")
@@ -333,8 +334,6 @@ def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, 
 
 def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
     """(T, J) share of each joint's own markers that are seen; 1 for joints that carry none."""
-    from .pose.residuals import seen_markers
-
     seen = np.isfinite(seen_markers(model, trial)).all(axis=-1)
     worth = np.ones((len(trial), len(model.skeleton)))
     for joint, rows in model.clusters().items():
@@ -354,8 +353,6 @@ def _has_legs(motion: Motion) -> bool:
 
 def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
     """Height in metres of the floor, told where it is not at 0."""
-    from .pose.residuals import floor_under
-
     floor = floor_under(model, trial)
     if abs(floor) > _TOLD_FLOOR:
         done = "markers and motion were moved so that it is at 0" if settings.floor else "--floor moves it to 0"
@@ -374,14 +371,12 @@ def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
 
 def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
     """When and how the ball left the hand, where that is asked for; it lies there as the model says, if it says so."""
-    from .release.release import radar_speed
+    from .release.release import ReleaseSettings, radar_speed, release
 
     label = _ball_label(model, marker_set, trial)
     told = label is not None or radar_speed(trial.name) is not None
     if settings.release == "no" or (settings.release == "auto" and not told):
         return None
-    from .release.release import ReleaseSettings, release
-
     asked = ReleaseSettings(label, settings.radius, ball=settings.ball)
     if model.ball is not None and model.ball.label == label:
         side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"

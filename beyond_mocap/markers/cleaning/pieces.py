@@ -20,7 +20,7 @@ _LEAP_LOCAL, _LEAP_WORLD, _TIMES_ITS_OWN = 0.02, 0.04, 6.0
 _LEAP_SWING_LOCAL, _LEAP_SWING_WORLD = 200.0, 500.0
 
 _BURST = 0.08  # the longest burst that is taken out as a jump, s
-# and how far off its way it lies at least, m, and as a part of what the marker moves meanwhile
+# how far off its way a burst lies at least, m, and as a part of what the marker moves meanwhile
 _LEAST_BURST, _LEAST_SHARE = 0.015, 0.3
 _GHOST = 0.06  # a longer stretch is a ghost if it lies at least this far from where its helpers say, m
 # a single sample is off if it leaves the way by this much, m (as its helpers see it; in the world), by more than limbs

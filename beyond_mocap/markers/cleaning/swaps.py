@@ -17,8 +17,8 @@ from .carriers import Carried
 from .cluster_shape import median
 
 _PART, _LESS = 0.6, 0.008  # exchanging must bring the deformation down to this part of it and by this much, m
-_STRANGE = 2.0  # which must have been more than this many times the usual
-# and to no more than this, m, or this many times what is usual there, or this part of it
+_STRANGE = 2.0  # the deformation must have been more than this many times the usual
+# exchanged it must be no more than this, m, or this many times what is usual there, or this part of it
 _WELL, _TIMES_USUAL, _FAR_LESS = 0.015, 2.5, 0.25
 _EVERY = 0.025  # how often the slow questions are asked, s; a swap shorter than this is only found by its leaps
 # two markers leap onto each other's ways if they are this far apart, m, and miss them by no more than this part of it

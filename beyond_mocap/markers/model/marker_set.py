@@ -28,7 +28,7 @@ class MarkerSet:
     """The markers of one protocol.
 
     name: one word. segments: joint name (of `template.JOINTS`) -> labels of the markers that it carries.
-    landmarks: anatomical point (of `landmarks.LANDMARKS`) -> labels; several mark it by their mean.
+    landmarks: anatomical point (of `template.LANDMARKS`) -> labels; several mark it by their mean.
     aliases: another label -> the set's own. static: markers that may be missing in all but the static trial.
     optional: markers that may be missing anywhere. ball: markers on a ball. other: markers on things that are no body.
     about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments.
