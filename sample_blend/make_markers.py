@@ -19,7 +19,7 @@ HERE = Path(__file__).resolve().parent
 if __name__ == "__main__":
     sys.path.insert(0, str(HERE.parent))
 
-from beyond_mocap.markers.files.trc_write import write_trc  # noqa: E402
+from beyond_mocap.markers.files.trc import write_trc  # noqa: E402
 from beyond_mocap.markers.trial import MarkerTrial  # noqa: E402
 from beyond_mocap.motion.retargeting.adult import adult_skeleton  # noqa: E402
 from beyond_mocap.synthetic.gait import gait  # noqa: E402

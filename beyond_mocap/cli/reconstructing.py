@@ -171,7 +171,7 @@ def _write_overview(rows, options, told: Told) -> None:
     from ..evaluation.plots import require_matplotlib
     from ..files.tables import write_report
     from ..files.whole import atomic_write
-    from ..markers.report.page import trials_report
+    from ..markers.trials_page import trials_report
 
     write_report(options.out / "trials.json", {"trials": rows})
     try:

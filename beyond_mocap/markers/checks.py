@@ -15,10 +15,10 @@ import numpy as np
 
 from ..base.errors import InputError, TimedLine
 from ..base.time_series import runs
+from .files.unit_and_axes import handedness
 from .model.marker_set import UNLABELED
 from .model.model import MarkerModel
-from .trial import MarkerTrial
-from .upright import handedness
+from .trial import MarkerTrial, list_some
 
 _MIRRORED = -0.5
 _OFF = 0.012  # metres by which a distance may differ, beside half of what it does in the trial itself
@@ -28,10 +28,8 @@ _FEW = 4  # distances that are too few to tell
 _EMPTY_SECONDS, _EMPTY_SHARE = 0.1, 0.2  # from when on a stretch with so few markers is told
 
 
-def check(
-    trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
-    model: MarkerModel | None = None,
-) -> tuple[str, ...]:
+def check(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str, Sequence[str]],
+          model: MarkerModel | None = None) -> tuple[str, ...]:
     """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
 
     clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and
@@ -59,7 +57,7 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
     lacking = [label for label in trial.labels if label not in static.labels]
     if not lacking:
         return []
-    told = some(lacking)
+    told = list_some(lacking)
     if len(lacking) > _LACKING * len(trial.labels):
         raise InputError(
             static.name,
@@ -69,16 +67,11 @@ def _complete(trial: MarkerTrial, static: MarkerTrial) -> list[str]:
     return [f"{static.name} lacks {told}: where these lie is told by the motion"]
 
 
-def some(labels: Sequence[str]) -> str:
-    """The first of many labels."""
-    return ", ".join(labels[:6]) + (f" and {len(labels) - 6} more" if len(labels) > 6 else "")
-
-
 def unused(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]], others: Sequence[str] = ()) -> list[str]:
     """A line on the named markers that lie on no segment; others: those known to be on no body."""
     known = {label for group in clusters.values() for label in group} | set(others)
     left = [label for label in trial.labels if label not in known and not UNLABELED.match(label)]
-    return [f"{len(left)} markers of no segment are not used: {some(left)}"] if left else []
+    return [f"{len(left)} markers of no segment are not used: {list_some(left)}"] if left else []
 
 
 def _check_sides(trial: MarkerTrial, static: MarkerTrial | None, clusters) -> None:
@@ -167,10 +160,8 @@ def _same_body(trial: MarkerTrial, known, clusters, name: str, what: str) -> lis
     told = ", ".join(f"{a}-{b} {1000 * usual[a, b]:.0f} against {1000 * known[a, b]:.0f} mm" for a, b in worst)
     count = f"{int(wrong.sum())} of {len(pairs)} distances within segments differ from {what}'s: {told}"
     if share >= _OTHER_BODY:
-        raise InputError(
-            trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
-            f"{what} of the same body in the same session", "choose that, or go without",
-        )
+        raise InputError(trial.name, f"{count}; {name} is of another body, or its markers were put on anew",
+                         f"{what} of the same body in the same session", "choose that, or go without")
     return [f"{count}; some markers may have been put on anew"]
 
 

@@ -16,14 +16,14 @@ from ..motion.motion import Motion
 from .cleaning.clean import Cleaned, clean
 from .model.model import MarkerModel
 from .pose.pose import HeldBall, PoseSettings, Solved, solve
-from .trial import MarkerTrial
+from .pose.residuals import floor_under, seen_markers
+from .trial import MarkerTrial, evenly, list_some
 
 _DEFAULTS = defaults("markers")
 FILTERS = setting("markers", "filter").choice_names
 RELEASES = setting("markers", "release").choice_names
 _SMOOTHNESS = setting("markers", "smoothness")
-LEAST_MARKERS = 0.5
-"""Share of a model's markers that a trial must have."""
+LEAST_MARKERS = 0.5  # share of a model's markers that a trial must have
 _TOLD_FLOOR = 0.02  # metres
 _FAR_MEAN, _FAR_MARKER = 0.015, 0.04  # metres on average from which on a model hardly fits, or one of its markers
 
@@ -92,19 +92,14 @@ class Reconstruction:
 
     def report(self) -> dict:
         """The figures, for JSON."""
-        from .report.reconstruction import figures
+        from .reconstruction_figures import figures
 
         return {"version": __version__, **figures(self)}
 
 
-def reconstruct(
-    trial: MarkerTrial,
-    static: MarkerTrial | None = None,
-    model: MarkerModel | None = None,
-    settings: ReconstructSettings = ReconstructSettings(),
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Reconstruction:
+def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: MarkerModel | None = None,
+                settings: ReconstructSettings = ReconstructSettings(), progress: Progress | None = None,
+                cancelled: Callable[[], bool] | None = None) -> Reconstruction:
     """The skeleton that moved under the markers of a trial.
 
     static: the same markers on the same standing body, from which the model is made; without one it is made of the
@@ -208,7 +203,7 @@ def set_of(trial: MarkerTrial, model: MarkerModel | None, settings: ReconstructS
 
 def named_by(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """The trial under the set's own names."""
-    from .naming import named_as
+    from .model.marker_set import named_as
 
     return trial if marker_set is None else named_as(trial, marker_set)
 
@@ -225,19 +220,17 @@ def clusters_of(marker_set, model: MarkerModel | None, trial: MarkerTrial) -> di
 
 def _checked(trial, still, marker_set, model) -> tuple[str, ...]:
     """Whether the markers are mirrored, or those of somebody else than the static's."""
-    from .checks import check, some, unused
+    from .checks import check, unused
 
     clusters = clusters_of(marker_set, model, trial)
     others = () if marker_set is None else (*marker_set.ball, *marker_set.other)
     lacking = () if marker_set is None or model is not None else marker_set.lacking(trial.labels)
-    gone = [f"of the set {marker_set.name} there is no {some(lacking)}"] if lacking else []
+    gone = [f"of the set {marker_set.name} there is no {list_some(lacking)}"] if lacking else []
     return (*gone, *unused(trial, clusters, others), *check(trial, still, clusters, model))
 
 
-def modelled(
-    trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
-    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
-) -> MarkerModel:
+def modelled(trial: MarkerTrial, static: MarkerTrial | None, settings: ReconstructSettings = ReconstructSettings(),
+             progress: Progress | None = None, cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model alone, as `reconstruct` makes it of a trial and its static. Raises as that does."""
     marker_set = set_of(trial, None, settings)
     seen, still = (None if one is None else named_evenly(one, marker_set) for one in (trial, static))
@@ -249,8 +242,6 @@ def modelled(
 
 def named_evenly(trial: MarkerTrial, marker_set) -> MarkerTrial:
     """The trial under the set's names, its frames on even times."""
-    from .frame_times import evenly
-
     return evenly(named_by(trial, marker_set))
 
 
@@ -260,7 +251,6 @@ def _tidied(trial: MarkerTrial, marker_set, model, progress, cancelled) -> Clean
 
 
 def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
-    from .checks import some
     from .model.calibrate import calibrate
 
     try:
@@ -269,19 +259,15 @@ def _calibrated(marker_set, trial, still, progress, cancelled) -> MarkerModel:
         lacking = [] if still is None else [label for label in trial.labels if label not in still.labels]
         if not lacking:
             raise
-        raise InputError(still.name, f"{error}; it lacks {some(lacking)}") from None
+        raise InputError(still.name, f"{error}; it lacks {list_some(lacking)}") from None
 
 
 def _check_fits(model: MarkerModel, trial: MarkerTrial) -> None:
-    from .checks import some
-
     lacking = [label for label in model.markers if label not in trial.labels]
     if len(lacking) > (1.0 - LEAST_MARKERS) * len(model.markers):
-        raise InputError(
-            trial.name,
-            f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers, not {some(lacking)}",
-            "a trial with the model's markers", "choose another model, or the marker set whose labels these are",
-        )
+        found = f"has {len(model.markers) - len(lacking)} of the model's {len(model.markers)} markers"
+        raise InputError(trial.name, f"{found}, not {list_some(lacking)}", "a trial with the model's markers",
+                         "choose another model, or the marker set whose labels these are")
 
 
 def _posed(model: MarkerModel, trial: MarkerTrial, marker_set, settings, road: _Road, cancelled) -> Solved:
@@ -329,8 +315,7 @@ def _ball_label(model: MarkerModel, marker_set, trial: MarkerTrial) -> str | Non
 
 def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, road: _Road):
     """The motion after both filters, and which points of the feet are held. trial: as it was seen, no gap filled."""
-    from .pose.butterworth import butterworth
-    from .pose.kalman import kalman
+    from .pose.low_pass import butterworth, kalman
     from .pose.plant_filter import plant_filter
 
     motion = solved.motion
@@ -349,8 +334,6 @@ def _filtered(solved: Solved, model: MarkerModel, trial: MarkerTrial, settings, 
 
 def told_by_markers(model: MarkerModel, trial: MarkerTrial) -> np.ndarray:
     """(T, J) share of each joint's own markers that are seen; 1 for joints that carry none."""
-    from .pose.residuals import seen_markers
-
     seen = np.isfinite(seen_markers(model, trial)).all(axis=-1)
     worth = np.ones((len(trial), len(model.skeleton)))
     for joint, rows in model.clusters().items():
@@ -370,8 +353,6 @@ def _has_legs(motion: Motion) -> bool:
 
 def _floor(model: MarkerModel, trial: MarkerTrial, settings: ReconstructSettings, road: _Road) -> float:
     """Height in metres of the floor, told where it is not at 0."""
-    from .floor import floor_under
-
     floor = floor_under(model, trial)
     if abs(floor) > _TOLD_FLOOR:
         done = "markers and motion were moved so that it is at 0" if settings.floor else "--floor moves it to 0"
@@ -390,14 +371,12 @@ def _lowered(trial: MarkerTrial, by: float) -> MarkerTrial:
 
 def _release(trial, motion, model: MarkerModel, marker_set, settings: ReconstructSettings, road: _Road):
     """When and how the ball left the hand, where that is asked for; it lies there as the model says, if it says so."""
-    from .release.radar import radar_speed
+    from .release.release import ReleaseSettings, radar_speed, release
 
     label = _ball_label(model, marker_set, trial)
     told = label is not None or radar_speed(trial.name) is not None
     if settings.release == "no" or (settings.release == "auto" and not told):
         return None
-    from .release.release import ReleaseSettings, release
-
     asked = ReleaseSettings(label, settings.radius, ball=settings.ball)
     if model.ball is not None and model.ball.label == label:
         side = "left" if model.skeleton.names[model.ball.joint].startswith("Left") else "right"

@@ -8,6 +8,7 @@ without a static are modelled from their own motion.
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -65,14 +66,9 @@ def recordings_of(folder: Path) -> list[Recording]:
     return [Recording(path, name, session.removeprefix(".")) for path, name, session in zip(paths, names, sessions)]
 
 
-def reconstruct_folder(
-    folder: Path,
-    read: Read,
-    settings: ReconstructSettings = ReconstructSettings(),
-    model: MarkerModel | None = None,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Iterator[Made]:
+def reconstruct_folder(folder: Path, read: Read, settings: ReconstructSettings = ReconstructSettings(),
+                       model: MarkerModel | None = None, progress: Callable[[float, str], None] | None = None,
+                       cancelled: Callable[[], bool] | None = None) -> Iterator[Made]:
     """Every trial of a folder, one after the other; what cannot be made is told and does not stop the others.
 
     read: reads one file. model: for all of them, instead of models made here. InputError for a folder without trials.
@@ -150,13 +146,8 @@ def _static_for(one: Recording, trial: MarkerTrial, statics, settings):
         except InputError as error:
             note = f"goes without a static: {error}"
             continue
-        fits.append((_alike(recording.path.stem, one.path.stem), shared, (recording, static)))
+        fits.append((len(os.path.commonprefix([recording.path.stem, one.path.stem])), shared, (recording, static)))
     return (max(fits, key=lambda row: row[:2])[2], "") if fits else (None, note)
-
-
-def _alike(a: str, b: str) -> int:
-    """How many letters two names begin with in common."""
-    return next((i for i, (x, y) in enumerate(zip(a, b)) if x != y), min(len(a), len(b)))
 
 
 def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Path, MarkerModel]:
@@ -173,7 +164,7 @@ def _models(plans: Sequence[_Plan], read: Read, settings, cancelled) -> dict[Pat
         groups.setdefault((first[path].subject, own.set_name, own.skeleton.names), []).append(path)
     for paths in groups.values():
         if len({first[path].recording.session for path in paths}) > 1:
-            from .model.subject import subject_models
+            from .model.assemble import subject_models
 
             models.update(zip(paths, subject_models([models[path] for path in paths])))
     return models

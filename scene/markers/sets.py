@@ -81,7 +81,7 @@ def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
     """Give a cloud's labels the names, segments and roles of a marker set; returns lines about what does not fit."""
     from ...beyond_mocap.markers.files.marker_set_text import marker_set_text
-    from ...beyond_mocap.markers.naming import named_as
+    from ...beyond_mocap.markers.model.marker_set import named_as
     from .cloud import read
 
     kept, rows = cloud.beyond_mocap_cloud, _rows_of(marker_set)

@@ -50,7 +50,7 @@ def segments(_label, _context, typed: str) -> list[str]:
 
 def landmarks(_label, _context, typed: str) -> list[str]:
     """The anatomical points that a marker can lie on."""
-    from ...beyond_mocap.markers.model.landmarks import LANDMARKS
+    from ...beyond_mocap.markers.model.template import LANDMARKS
 
     return [name for name in sorted(LANDMARKS) if typed.lower() in name]
 

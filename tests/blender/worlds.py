@@ -63,7 +63,7 @@ def plant_markers():
     known = importlib.import_module(f"{core}.synthetic.ground_truth.planted_markers").planted(
         gait, "plug_in_gait", seed=3, occlusion=0.02, swaps=0, jumps=0, unlabeled=1
     )
-    write = importlib.import_module(f"{core}.markers.files.trc_write").write_trc
+    write = importlib.import_module(f"{core}.markers.files.trc").write_trc
     write(known.trial, MARKERS / "walk.trc")
     write(known.static.frames(0, 40), MARKERS / "static.trc")
 

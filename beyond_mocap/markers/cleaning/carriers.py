@@ -13,16 +13,13 @@ from types import MappingProxyType
 import numpy as np
 
 from ..frames import RigidFit, rigid_fit, taken_back
-from .cluster_shape import Shape, distance_spread, mean_shape
-from .robust import median
+from .cluster_shape import Shape, distance_spread, mean_shape, median
 
 _MOST_HELPERS = 5
 # helpers must keep their distances from each other to this, m; where too few do, to the next
 _TOLERANCES = (0.012, 0.025, 0.05, 0.1)
-# the most that markers of one segment move against each other, m
-_SKIN = 0.01
-# what distance adds to how soft a pair is held to be, metres a metre
-_FAR = 0.02
+_SKIN = 0.01  # the most that markers of one segment move against each other, m
+_FAR = 0.02  # what distance adds to how soft a pair is held to be, metres a metre
 # a frame made of helpers that deviate more than this is not trusted, m, or than this many times the usual
 _DEFORMED, _TIMES_USUAL = 0.012, 3.0
 
@@ -81,14 +78,9 @@ def softness(positions: np.ndarray, clusters: Iterable[Sequence[int]] = ()) -> n
     return soft
 
 
-def carriers(
-    positions: np.ndarray,
-    soft: np.ndarray,
-    wanted: Iterable[int],
-    known: Mapping[int, Carried] = MappingProxyType({}),
-    changed: Iterable[int] = (),
-    ask: Callable[[], None] = lambda: None,
-) -> dict[int, Carried]:
+def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
+             known: Mapping[int, Carried] = MappingProxyType({}), changed: Iterable[int] = (),
+             ask: Callable[[], None] = lambda: None) -> dict[int, Carried]:
     """Marker -> how it is carried, for `wanted` markers of positions (T, M, 3) m.
 
     soft: (M, M) m from `softness`. known: an earlier look, of whose markers a few samples have `changed`: their shapes

@@ -1,32 +1,132 @@
 """The clean-up of a trial: swaps mended, jumps taken out, unlabeled markers named, gaps filled (Fredriksson §5.1).
 
 He did this by hand, for four of his seven subjects. Here each marker is seen from the markers that move with it
-(`carriers`), and only what contradicts them clearly is touched; a clean trial comes back as it was.
+(`carriers`), and only what contradicts them clearly is touched; a clean trial comes back as it was. The report says in
+lines for people what was done.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
-from ...base.errors import Cancelled, InputError
+from ...base.errors import Cancelled, InputError, TimedLine
 from ...base.time_series import runs
 from ..trial import MarkerTrial
 from .carriers import carriers, softness
-from .clean_report import CleanReport, Stretch
 from .gaps import Longest, fill
-from .jumps import take_out
-from .pieces import leaps
+from .pieces import assign, leaps, take_out, unlabeled
 from .swaps import mend, there_and_back
-from .unlabeled import assign, unlabeled
 
-# a marker this much farther from its place than its tolerance for this long is told, s
-_STRAYED, _FOR = 1.5, 0.1
-# within so many frames of a leap or a gap
-_NEAR_BREAK = 3
+_STRAYED, _FOR = 1.5, 0.1  # a marker this much farther from its place than its tolerance for this long is told, s
+_NEAR_BREAK = 3  # within so many frames of a leap or a gap
+
+
+_MOST_LINES = 6  # where more markers than this have something to tell, one line tells it for all
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stretch:
+    """Something that was found between two moments.
+
+    labels: the markers concerned. start, end: seconds on the trial's clock, the first frame and the last. frames: how
+    many. how: what was done, in a word; "" where nothing could be. off: m, how far off its place it was.
+    """
+
+    labels: tuple[str, ...]
+    start: float
+    end: float
+    frames: int
+    how: str = ""
+    off: float = 0.0
+
+    def when(self) -> str:
+        """`at 1.234 s` or `1.234 to 1.300 s`."""
+        return f"at {self.start:.3f} s" if self.frames == 1 else f"{self.start:.3f} to {self.end:.3f} s"
+
+
+@dataclass(frozen=True, kw_only=True)
+class CleanReport:
+    """What was found and done.
+
+    seen: label -> share of the frames in which the recording sees it. gaps: what was filled; how is "cluster", "soft"
+    or "spline". left: gaps that stay. swaps: how is "mended" or ""; the labels stand in pairs. jumps: samples taken out
+    (filled again where a gap is). assigned: (unlabeled marker, label). strayed: markers that stay far from where their
+    cluster says. unnamed: unlabeled markers that remain, with the share of frames.
+    """
+
+    seen: Mapping[str, float] = field(default_factory=dict)
+    gaps: tuple[Stretch, ...] = ()
+    left: tuple[Stretch, ...] = ()
+    swaps: tuple[Stretch, ...] = ()
+    jumps: tuple[Stretch, ...] = ()
+    assigned: tuple[Stretch, ...] = ()
+    strayed: tuple[Stretch, ...] = ()
+    unnamed: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """What people should know, the gravest first; each line knows its seconds (`errors.spans_of`)."""
+        return (*(_swapped(swap) for swap in self.swaps),
+                *(_timed(f"{one.labels[0]} taken for {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
+                *_by_label(self.jumps, "jumping frames taken out"),
+                *_by_label(self.strayed, "frames far from where the markers around it say"),
+                *_by_label(self.left, "frames not seen and left open"),
+                *_summed(self.gaps, "frames not seen and filled"))
+
+    def as_dict(self) -> dict:
+        """The report as plain values, for JSON."""
+        return asdict(self) | {"lines": list(self.lines)}
+
+
+def _swapped(swap):
+    pairs = ", ".join(f"{a} and {b}" for a, b in zip(swap.labels[::2], swap.labels[1::2]))
+    done = "exchanged, mended" if swap.how else "seem exchanged, not mended: nothing around them tells"
+    return _timed(f"{pairs} {done} {swap.when()}", [swap])
+
+
+def _by_label(stretches, what):
+    """One line for each label, and one for all that share all their stretches; one in all where these are many."""
+    own: dict[str, list] = {}
+    for stretch in stretches:
+        own.setdefault(stretch.labels[0], []).append(stretch)
+    alike: dict[tuple, list[str]] = {}
+    for label, ones in own.items():
+        alike.setdefault(tuple((one.start, one.frames) for one in ones), []).append(label)
+    if len(alike) > _MOST_LINES:
+        yield from _summed(stretches, what)
+        return
+    for labels in alike.values():
+        ones = own[labels[0]]
+        count = sum(one.frames for one in ones)
+        counted = what if count != 1 else what.replace("frames", "frame")
+        shown = ", ".join(one.when() for one in ones[:3]) + (f" and {len(ones) - 3} more" if len(ones) > 3 else "")
+        yield _timed(f"{_named(labels)}: {count} {counted}: {shown}", ones)
+
+
+def _summed(stretches, what):
+    """One line for all of them: how many frames, of which markers most."""
+    count: dict[str, int] = {}
+    for stretch in stretches:
+        count[stretch.labels[0]] = count.get(stretch.labels[0], 0) + stretch.frames
+    most = sorted(count, key=lambda label: -count[label])
+    shown = ", ".join(f"{label} {count[label]}" for label in most[:5]) + (", ..." if len(most) > 5 else "")
+    if count:
+        yield _timed(f"{sum(count.values())} {what}: {shown}", stretches)
+
+
+def _named(labels):
+    """`LKNE`, `LKNE and LANK`, or `46 markers (LFHD, RFHD, LBHD, ...)`."""
+    if len(labels) > 4:
+        return f"{len(labels)} markers ({', '.join(labels[:3])}, ...)"
+    return " and ".join([", ".join(labels[:-1]), labels[-1]] if len(labels) > 1 else labels)
+
+
+def _timed(text, stretches):
+    return TimedLine(text, *((stretch.start, stretch.end) for stretch in stretches))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,13 +201,9 @@ class _Work:
                        off=float(off))
 
 
-def clean(
-    trial: MarkerTrial,
-    clusters: Mapping[str, Sequence[str]] | None = None,
-    settings: CleanSettings = CleanSettings(),
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Cleaned:
+def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = None,
+          settings: CleanSettings = CleanSettings(), progress: Callable[[float, str], None] | None = None,
+          cancelled: Callable[[], bool] | None = None) -> Cleaned:
     """A trial without swaps, jumps and the gaps that can be filled, and a report.
 
     clusters: segment -> labels of its markers, where a marker set is known (labels that the trial lacks are skipped);
@@ -116,11 +212,9 @@ def clean(
     clusters = clusters or {}
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}
-    work = _Work(
-        trial, np.array(trial.positions),
-        [[index[label] for label in labels if label in index] for labels in clusters.values()],
-        unlabeled(trial.labels, known), lambda: _go_on(cancelled),
-    )
+    work = _Work(trial, np.array(trial.positions),
+                 [[index[label] for label in labels if label in index] for labels in clusters.values()],
+                 unlabeled(trial.labels, known), lambda: _go_on(cancelled))
     work.found = {name: () for name in ("swaps", "jumps", "assigned", "strayed", "gaps", "left")}
     steps = [("who carries whom", _Work.look)]
     steps += [("swaps", _swaps)] if settings.swaps else []
@@ -174,16 +268,14 @@ def _opposite(work):
 
 
 def _jumps(work):
-    positions, found = take_out(work.positions, work.carried, work.trial.fps)
-    work.positions = positions
+    work.positions, found = take_out(work.positions, work.carried, work.trial.fps)
     work.found["jumps"] = tuple(work.stretch([j.marker], j.first, j.end, "taken out", j.off) for j in found)
     if found:
         work.look_again([jump.marker for jump in found])
 
 
 def _names(work):
-    positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
-    work.positions = positions
+    work.positions, found = assign(work.positions, work.carried, work.nameless, work.trial.fps)
     work.found["assigned"] = tuple(
         work.stretch([one.unlabeled, one.label], one.first, one.end, "assigned", one.off) for one in found
     )
@@ -194,8 +286,8 @@ def _names(work):
 def _gaps(work, settings):
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
-    filled, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried, ask=work.ask)
-    work.positions = filled
+    work.positions, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried,
+                                 ask=work.ask)
     for name, kept in (("gaps", True), ("left", False)):
         work.found[name] = tuple(
             work.stretch([gap.marker], gap.first, gap.end, gap.how) for gap in found if bool(gap.how) is kept

@@ -1,4 +1,8 @@
-"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all."""
+"""The shape of a cluster of markers over a whole trial, how much it deforms, and which markers are clusters at all;
+with the medians and quantiles that leave out NaN, for many markers at once.
+
+numpy's own (`nanmedian`, `nanpercentile`) go through Python for each column: a hundred times as slow on trials.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..frames import placed, rigid_fit, taken_back
-from .robust import median, medians, quantile
 
 _ROUNDS = 3
 _MOST_FRAMES = 100
@@ -88,3 +91,26 @@ def _middle_frame(positions):
     away = np.abs(distance - medians(distance))
     missing = np.isnan(away).sum(axis=(1, 2))
     return int(np.argmin(np.nansum(away, axis=(1, 2)) + 10.0 * missing))
+
+
+def quantile(values: np.ndarray, share: float, axis: int = 0) -> np.ndarray:
+    """The value that `share` (0 to 1) of what is there along `axis` stays below, straight between samples; NaN where
+    nothing is."""
+    ordered = np.moveaxis(np.sort(values, axis=axis), axis, 0)  # NaN comes last
+    if not len(ordered):
+        return np.full(ordered.shape[1:], np.nan)
+    at = np.maximum(np.isfinite(ordered).sum(axis=0) - 1, 0) * share
+    low = np.floor(at).astype(int)
+    high = np.ceil(at).astype(int)
+    below, above = (np.take_along_axis(ordered, index[None], axis=0)[0] for index in (low, high))
+    return below + (at - low) * (above - below)
+
+
+def medians(values: np.ndarray, axis: int = 0) -> np.ndarray:
+    """The median of what is there along `axis`; 0 where nothing is."""
+    return np.nan_to_num(quantile(values, 0.5, axis))
+
+
+def median(values: np.ndarray) -> float:
+    """The median of all that is there; 0 where nothing is."""
+    return float(medians(np.ravel(values)))

@@ -10,16 +10,13 @@ import numpy as np
 from ...base.easing import hermite
 from ...base.time_series import runs
 from .carriers import Carried, carried, helpers_of
-from .cluster_shape import Shape, mean_shape
-from .robust import quantile
+from .cluster_shape import Shape, mean_shape, quantile
 
 # a marker that strays this far from its place among its helpers rides on them softly, m: as a rule; in a twentieth of
 # the frames
 _SOFT, _SOFT_AT_TIMES = 0.015, 0.03
-# over how much time the slope at a gap's edge is read, s
-_EDGE = 0.03
-# a curve is taken if over stretches as long it would have been this near, m; tried on so many
-_NEAR, _TRIES = 0.02, 24
+_EDGE = 0.03  # over how much time the slope at a gap's edge is read, s
+_NEAR, _TRIES = 0.02, 24  # a curve is taken if over stretches as long it would have been this near, m; tried on so many
 
 
 class Gap(NamedTuple):
@@ -55,14 +52,8 @@ def gaps_of(positions: np.ndarray, markers: Iterable[int]) -> list[Gap]:
             for first, end in runs(~seen[:, marker])]
 
 
-def fill(
-    positions: np.ndarray,
-    soft: np.ndarray,
-    fps: float,
-    longest: Longest,
-    known: Mapping[int, Carried],
-    ask: Callable[[], None] = lambda: None,
-) -> tuple[np.ndarray, list[Gap]]:
+def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, known: Mapping[int, Carried],
+         ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Gap]]:
     """(positions (T, M, 3) m with gaps filled, the gaps and how): nothing that was seen is moved, and nothing jumps.
 
     soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries

@@ -14,20 +14,16 @@ import numpy as np
 from ...base.time_series import runs
 from ..frames import placed, rigid_fit
 from .carriers import Carried
-from .robust import median
+from .cluster_shape import median
 
-# exchanging must bring the deformation down to this part of it and by this much, m
-_PART, _LESS = 0.6, 0.008
-# which must have been more than this many times the usual
-_STRANGE = 2.0
-# and to no more than this, m, or this many times what is usual there, or this part of it
+_PART, _LESS = 0.6, 0.008  # exchanging must bring the deformation down to this part of it and by this much, m
+_STRANGE = 2.0  # the deformation must have been more than this many times the usual
+# exchanged it must be no more than this, m, or this many times what is usual there, or this part of it
 _WELL, _TIMES_USUAL, _FAR_LESS = 0.015, 2.5, 0.25
-# how often the slow questions are asked, s; a swap shorter than this is only found by its leaps
-_EVERY = 0.025
+_EVERY = 0.025  # how often the slow questions are asked, s; a swap shorter than this is only found by its leaps
 # two markers leap onto each other's ways if they are this far apart, m, and miss them by no more than this part of it
 _APART, _TURNED = 0.03, 0.4
-# where more than this are found, something else is wrong
-_MOST_SWAPS = 200
+_MOST_SWAPS = 200  # where more than this are found, something else is wrong
 
 Pairs = tuple[tuple[int, int], ...]
 
@@ -52,8 +48,7 @@ def exchanged(positions: np.ndarray, pairs: Pairs) -> np.ndarray:
 def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tuple[np.ndarray, list[Swap]]:
     """(positions (T, M, 3) m with these swaps exchanged back, the swaps): pairs that leap onto each other's ways twice.
 
-    Between the leaps they are exchanged, unless their clusters say that they
-    are before and after.
+    Between the leaps they are exchanged, unless their clusters say that they are before and after.
     """
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     together: dict[tuple[int, int], list[tuple[int, int]]] = {}
@@ -67,14 +62,8 @@ def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tup
     return out, found
 
 
-def mend(
-    positions: np.ndarray,
-    carried: Mapping[int, Carried],
-    leaping: np.ndarray,
-    fps: float,
-    opposite: Sequence[Pairs] = (),
-    ask: Callable[[], None] = lambda: None,
-) -> tuple[np.ndarray, list[Swap]]:
+def mend(positions: np.ndarray, carried: Mapping[int, Carried], leaping: np.ndarray, fps: float,
+         opposite: Sequence[Pairs] = (), ask: Callable[[], None] = lambda: None) -> tuple[np.ndarray, list[Swap]]:
     """(positions (T, M, 3) m with swaps exchanged back, the swaps): what deforms the clusters and mends them exchanged.
 
     leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
@@ -286,8 +275,7 @@ def _crossing(now, was, markers):
 
 
 def _untold(crossings, deformed, found, frames):
-    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there.
-    """
+    """A leap onto each other's ways of markers that no cluster tells of, which nothing has mended: told from there."""
     for pair, when in _moments(crossings).items():
         known = any(pair in swap.pairs and swap.first - 3 <= when[-1] <= swap.end + 3 for swap in found)
         if not known and not deformed.told((pair,)):

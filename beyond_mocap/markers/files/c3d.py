@@ -182,12 +182,10 @@ def _layout(path: Path, parameters: _Parameters, size: int) -> _Layout:
     if not 1e-12 < abs(scale) < 1e12:
         raise InputError(path, f"scale {scale:g} of the points", "a scale that is not 0", _EXPORT_AGAIN)
     header, first, frames = parameters.header, *_frames(parameters)
-    counts = {
-        "data": _starts(parameters),
-        "points": _counts(header.point_count, parameters.number("POINT:USED")),
-        "analog": _counts(header.analog_count, _analog(parameters)),
-        "frames": frames,
-    }
+    blocks = _counts(header.data_block, parameters.number("POINT:DATA_START"))
+    counts = {"data": [(block - 1) * BLOCK for block in blocks if block > 1],
+              "points": _counts(header.point_count, parameters.number("POINT:USED")),
+              "analog": _counts(header.analog_count, _analog(parameters)), "frames": frames}
     if not (any(counts["points"]) and counts["data"] and counts["frames"]):
         raise InputError(path, f"{header.point_count} markers, {max(counts['frames'], default=0)} frames", "markers",
                          "export the trial with its markers")  # fmt: skip
@@ -217,11 +215,6 @@ def _one_of(*values: float) -> float:
 def _counts(*values: float) -> list[int]:
     """The different whole numbers among these."""
     return list(dict.fromkeys(int(value) for value in values if math.isfinite(value) and value >= 0))
-
-
-def _starts(parameters: _Parameters) -> list[int]:
-    blocks = _counts(parameters.header.data_block, parameters.number("POINT:DATA_START"))
-    return [(block - 1) * BLOCK for block in blocks if block > 1]
 
 
 def _analog(parameters: _Parameters) -> float:
@@ -285,17 +278,12 @@ def _raw(path: Path, parameters: _Parameters, layout: _Layout, positions, residu
     if len(labels) < layout.points:
         notes.append(f"{layout.points - len(labels)} of {layout.points} points have no label")
     return RawMarkers(
-        labels=labels + [""] * (layout.points - len(labels)),
-        positions=positions,
-        fps=rate,
-        unit=" ".join(parameters.texts("POINT:UNITS")[:1]),
-        residuals=residuals,
+        labels=labels + [""] * (layout.points - len(labels)), positions=positions, fps=rate,
+        unit=" ".join(parameters.texts("POINT:UNITS")[:1]), residuals=residuals,
         up=_AXES.get("".join(parameters.texts("POINT:Y_SCREEN")[:1]).strip().upper()),
         prefixes=tuple(parameters.texts("SUBJECTS:LABEL_PREFIXES")),
         listed=tuple(label for group in _listed(parameters) for label in parameters.texts(f"POINT:{group}")),
-        events=_events(parameters),
-        start=max(layout.first_frame - 1, 0) / rate,
-        notes=notes,
+        events=_events(parameters), start=max(layout.first_frame - 1, 0) / rate, notes=notes,
     )
 
 

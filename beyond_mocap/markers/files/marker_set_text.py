@@ -9,13 +9,11 @@ from typing import Any
 
 from ...base.errors import InputError
 from ...files.content import utf8
-from ..model.landmarks import LANDMARKS
 from ..model.marker_set import MarkerSet
-from ..model.template import JOINTS
+from ..model.template import JOINTS, LANDMARKS
 
 SHIPPED = Path(__file__).resolve().parents[2] / "markers" / "sets"
-LARGEST = 1_000_000
-"""Bytes of a file above which it is no marker set."""
+LARGEST = 1_000_000  # bytes of a file above which it is no marker set
 _FORM = "see docs/markers/markers.md"
 _LISTS = ("static", "optional", "ball", "other")
 _KEYWORDS = "marker set, about, segment JOINT, landmark NAME, also LABEL, static, optional, ball, other"

@@ -17,8 +17,7 @@ from ..model.model import BallMarker, Freedom, MarkerModel
 from ..trial import repeated
 
 VERSION = 1
-LARGEST = 10_000_000
-"""Bytes of a file above which it is no model."""
+LARGEST = 10_000_000  # bytes of a file above which it is no model
 _PAGE = "docs/markers/markers.md"
 _TRIPLE = "[x, y, z] in metres"
 _FARTHEST = 100.0  # metres within a body
@@ -61,17 +60,11 @@ def model_text(model: MarkerModel) -> str:
 def _joint_out(model: MarkerModel, i: int) -> dict:
     skeleton, freedom = model.skeleton, model.freedom
     parent = skeleton.parents[i]
-    return {
-        "name": skeleton.names[i],
-        "parent": None if parent < 0 else skeleton.names[parent],
-        "offset": _list(skeleton.offsets[i]),
-        "order": freedom.order[i],
-        "free": [bool(one) for one in freedom.free[i]],
-        "low": _list(freedom.low[i]),
-        "high": _list(freedom.high[i]),
-        "stiffness": float(model.stiffness[i]),
-        "centre_sigma": _number_out(model.centre_sigma[i]),
-    }
+    return {"name": skeleton.names[i], "parent": None if parent < 0 else skeleton.names[parent],
+            "offset": _list(skeleton.offsets[i]), "order": freedom.order[i],
+            "free": [bool(one) for one in freedom.free[i]], "low": _list(freedom.low[i]),
+            "high": _list(freedom.high[i]), "stiffness": float(model.stiffness[i]),
+            "centre_sigma": _number_out(model.centre_sigma[i])}
 
 
 def _value_out(value) -> str:
@@ -119,15 +112,11 @@ def _model(whole) -> MarkerModel:
         joint=np.array([_index(row["joint"], f"marker {i}: joint", index) for i, row in enumerate(markers, 1)]),
         places=_places(markers, "marker", "place"),
         sigma=np.array([number(row["sigma"], f"marker {i}: sigma") for i, row in enumerate(markers, 1)]),
-        edge_sigma=_column(markers, "marker", "edge_sigma", math.nan),
-        freedom=_freedom(joints),
+        edge_sigma=_column(markers, "marker", "edge_sigma", math.nan), freedom=_freedom(joints),
         stiffness=_column(joints, "joint", "stiffness", 0.0),
-        centre_sigma=_column(joints, "joint", "centre_sigma", math.nan),
-        ball=_ball(whole.get("ball"), index),
-        subject=text(whole.get("subject", ""), "subject"),
-        sessions=_texts(whole.get("sessions", []), "sessions"),
-        set_name=text(whole.get("marker_set", ""), "marker_set"),
-        notes=_texts(whole.get("notes", []), "notes"),
+        centre_sigma=_column(joints, "joint", "centre_sigma", math.nan), ball=_ball(whole.get("ball"), index),
+        subject=text(whole.get("subject", ""), "subject"), sessions=_texts(whole.get("sessions", []), "sessions"),
+        set_name=text(whole.get("marker_set", ""), "marker_set"), notes=_texts(whole.get("notes", []), "notes"),
     )
 
 
@@ -145,13 +134,9 @@ def _skeleton(joints, names, index, tips) -> Skeleton:
         raise InputError("joints", "none", "a body")
     parents = [-1 if row["parent"] is None else _index(row["parent"], f"joint {i}: parent", index)
                for i, row in enumerate(joints, 1)]  # fmt: skip
-    return Skeleton(
-        tuple(names),
-        tuple(parents),
-        _places(joints, "joint", "offset"),
-        tuple(_index(row["joint"], f"tip {i}: joint", index) for i, row in enumerate(tips, 1)),
-        _places(tips, "tip", "offset"),
-    )
+    return Skeleton(tuple(names), tuple(parents), _places(joints, "joint", "offset"),
+                    tuple(_index(row["joint"], f"tip {i}: joint", index) for i, row in enumerate(tips, 1)),
+                    _places(tips, "tip", "offset"))
 
 
 def _freedom(joints) -> Freedom:

@@ -1,27 +1,32 @@
-"""Markers as a file holds them, and their way to a trial of ours: one subject, metres, Z up, nothing that is no
-marker."""
+"""Markers as a file holds them, and their way to a trial of ours: one subject, metres, Z up, unique labels, nothing
+that is no marker."""
 
 from __future__ import annotations
 
 import os
+import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from ...base.errors import InputError
-from ..trial import MarkerEvent, MarkerTrial
-from ..upright import handedness, tall, up_axis
-from . import marker_labels, marker_unit
+from ..trial import MarkerEvent, MarkerTrial, list_some
+from .unit_and_axes import decide_unit, handedness, read_given_unit, tall, up_axis
 
 _WILD = 1e9  # in any unit
 _FARTHEST = 1000.0  # metres from the origin: a mark for "not seen", or damage
-_UP = {
-    (2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)),
-    (1, 1): ((0, 2, 1), (1, -1, 1)), (1, -1): ((0, 2, 1), (1, 1, -1)),
-    (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1)),
-}  # fmt: skip
+_UP = {(2, 1): ((0, 1, 2), (1, 1, 1)), (2, -1): ((0, 1, 2), (1, -1, -1)), (1, 1): ((0, 2, 1), (1, -1, 1)),
+       (1, -1): ((0, 2, 1), (1, 1, -1)), (0, 1): ((1, 2, 0), (1, 1, 1)), (0, -1): ((1, 2, 0), (-1, 1, -1))}
 """What points up in the file, (axis, sign) -> which of its axes ours are, and their signs: turned, never mirrored."""
+
+FEWEST_OF_A_BODY = 10  # markers below which a subject of a file is taken for an object
+
+_COMPUTED = re.compile(
+    r"(Angles?V?|Force|Moment|Power|GRF|CentreOfMass(Floor)?|CenterOfMass(Floor)?|^CoM(Floor)?|GroundReaction\w*"
+    r"|NormalisedGRF)$", re.I)  # fmt: skip
+_FRAME_OF = re.compile(r"(.+)([OALP])")
 
 
 @dataclass(kw_only=True)
@@ -50,7 +55,7 @@ class RawMarkers:
 
 def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None, subject: str | None,
              up: str | None) -> MarkerTrial:  # fmt: skip
-    """The trial that a file holds. unit: as the user gives it (`marker_unit.metres_per_unit`), None for the file's.
+    """The trial that a file holds. unit: as the user gives it (`unit_and_axes.metres_per_unit`), None for the file's.
     subject: whose markers, None for the only body. up: the file's axis that points up ("Z", "-Y"), None to find it.
 
     InputError where no marker is ever seen, several bodies are in the file and none is chosen, or the unit is unknown.
@@ -63,8 +68,8 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     wild = (np.abs(positions) > _WILD).any(axis=-1)
     positions[wild] = np.nan
     known = unit is not None
-    metres, how = (marker_unit.given(path, unit, positions) if known
-                   else marker_unit.decided(path, raw.unit, positions, tall(labels, positions)))  # fmt: skip
+    metres, how = (read_given_unit(path, unit, positions) if known
+                   else decide_unit(path, raw.unit, positions, tall(labels, positions)))  # fmt: skip
     notes.insert(0, how)
     positions *= metres
     far = wild | (np.abs(positions) > _FARTHEST).any(axis=-1)
@@ -77,7 +82,8 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
     if residuals is not None:
         residuals = np.where(np.isfinite(positions).all(axis=-1), residuals * metres, np.nan)
         residuals = residuals if np.nanmax(residuals, initial=0) > 0 else None
-    _tell_mirrored(labels, positions, notes)
+    if handedness(labels, positions) < -0.5:
+        notes.append("the body is mirrored: its coordinates are left-handed, or left and right labels are exchanged")
     return MarkerTrial(labels=tuple(labels), positions=positions, fps=raw.fps, residuals=residuals,
                        events=_events(raw, whose), start=raw.start, name=Path(path).stem, subject=whose,
                        notes=tuple(notes))  # fmt: skip
@@ -85,31 +91,31 @@ def as_trial(raw: RawMarkers, path: str | os.PathLike, unit: float | str | None,
 
 def _choose(raw: RawMarkers, path, subject, notes) -> tuple[list[int], list[str], str]:
     """Which points are the subject's markers, their labels, and who that is."""
-    listed = {marker_labels.split(label, raw.prefixes)[1] for label in raw.listed}
-    parted = [marker_labels.split(label, raw.prefixes) for label in raw.labels]
+    listed = {split_label(label, raw.prefixes)[1] for label in raw.listed}
+    parted = [split_label(label, raw.prefixes) for label in raw.labels]
     of: dict[str, list[str]] = {}
     for name, label in parted:
         of.setdefault(name, []).append(label)
-    dropped = {name: marker_labels.computed(labels, listed) for name, labels in of.items()}
+    dropped = {name: find_computed(labels, listed) for name, labels in of.items()}
     points = [i for i, (name, label) in enumerate(parted) if label not in dropped[name]]
     if len(points) < len(parted):
         some = list(dict.fromkeys(label for name, label in parted if label in dropped[name]))
-        notes.append(f"{len(parted) - len(points)} computed points left out: {_few(some)}")
+        notes.append(f"{len(parted) - len(points)} computed points left out: {list_some(some)}")
     if not points:
         raise InputError(path, "no markers", "points that are markers", "export the trial with its markers")
     counts: dict[str, int] = {}
     for i in points:
         counts[parted[i][0]] = counts.get(parted[i][0], 0) + 1
-    whose = marker_labels.chosen_subject(path, counts, subject)
-    kept = [i for i in points if parted[i][0] in ("", whose) or counts[parted[i][0]] < marker_labels.FEWEST_OF_A_BODY]
+    whose = chosen_subject(path, counts, subject)
+    kept = [i for i in points if parted[i][0] in ("", whose) or counts[parted[i][0]] < FEWEST_OF_A_BODY]
     labels = [parted[i][1] if parted[i][0] in ("", whose) else ":".join(parted[i]) for i in kept]
     if others := [name for name in counts if name not in ("", whose)]:
-        notes.append(f"subject {whose or 'without a name'!r} of {_few(list(counts))}")
-        if objects := [name for name in others if counts[name] < marker_labels.FEWEST_OF_A_BODY]:
-            notes.append(f"markers of {_few(objects)} kept under their own names")
-    labels, twice = marker_labels.unique(labels)
+        notes.append(f"subject {whose or 'without a name'!r} of {list_some(list(counts))}")
+        if objects := [name for name in others if counts[name] < FEWEST_OF_A_BODY]:
+            notes.append(f"markers of {list_some(objects)} kept under their own names")
+    labels, twice = make_unique(labels)
     if twice:
-        notes.append(f"labels that came twice, numbered: {_few(twice)}")
+        notes.append(f"labels that came twice, numbered: {list_some(twice)}")
     return kept, labels, whose
 
 
@@ -119,7 +125,7 @@ def _seen_only(path, labels, positions, residuals, notes):
     if not ever.any():
         raise InputError(path, f"{len(labels)} markers, none of them ever seen", "places of markers", "export it again")
     if not ever.all():
-        notes.append(f"never seen: {_few([label for label, seen in zip(labels, ever) if not seen])}")
+        notes.append(f"never seen: {list_some([label for label, seen in zip(labels, ever) if not seen])}")
     labels = [label for label, seen in zip(labels, ever) if seen]
     return labels, positions[:, ever], None if residuals is None else residuals[:, ever]
 
@@ -128,23 +134,14 @@ def _upright(raw: RawMarkers, labels, positions, given: str | None, notes) -> np
     """The places with Z up: as given, else as the file says, else as the body stands, else as such files usually
     are."""
     stands = up_axis(labels, positions)
-    said = {
-        "as given": None if given is None else axis_named(given),
-        "as the file says": raw.up,
-        "heads above feet": stands,
-        "as such files usually are": raw.usual_up,
-    }
+    said = {"as given": None if given is None else axis_named(given), "as the file says": raw.up,
+            "heads above feet": stands, "as such files usually are": raw.usual_up}
     why, up = next((why, up) for why, up in said.items() if up)
     notes.append(f"{_axis(up)} is up, {why}")
     if stands and stands != up and given is None:
         notes.append(f"heads lie above feet along {_axis(stands)}, though: check which way is up")
     axes, signs = _UP[up]
     return positions[..., axes] * np.array(signs, dtype=float)
-
-
-def _tell_mirrored(labels, positions, notes) -> None:
-    if handedness(labels, positions) < -0.5:
-        notes.append("the body is mirrored: its coordinates are left-handed, or left and right labels are exchanged")
 
 
 def _events(raw: RawMarkers, whose: str) -> tuple[MarkerEvent, ...]:
@@ -164,6 +161,70 @@ def _axis(up: tuple[int, int]) -> str:
     return ("-" if up[1] < 0 else "") + "XYZ"[up[0]]
 
 
-def _few(names, most: int = 6) -> str:
-    names = [name or "(no name)" for name in names]
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+def split_label(label: str, prefixes: Iterable[str] = ()) -> tuple[str, str]:
+    """(subject, label) of a label as files write it: "Derrick:C7", or by the prefixes that the file names."""
+    for prefix in sorted((one for one in prefixes if one.strip()), key=len, reverse=True):
+        if label.startswith(prefix) and len(label) > len(prefix):
+            return prefix.strip().rstrip(":_").strip(), label[len(prefix) :].strip()
+    subject, colon, rest = label.rpartition(":")
+    return (subject.strip(), rest.strip()) if colon and rest.strip() else ("", label.strip())
+
+
+def find_computed(labels: Sequence[str], listed: Iterable[str] = ()) -> set[str]:
+    """Which of these are no markers: `listed` by the file as angles, forces and the like, named as such, or the four
+    points (O, A, L, P) of a segment's frame that Plug-in Gait works out."""
+    stems: dict[str, set[str]] = {}
+    for label in labels:
+        if frame := _FRAME_OF.fullmatch(label):
+            stems.setdefault(frame[1], set()).add(frame[2])
+    frames = {stem + letter for stem, letters in stems.items() if letters == set("OALP") for letter in letters}
+    there = set(labels)
+    return {label for label in labels if _COMPUTED.search(label)} | (frames & there) | (set(listed) & there)
+
+
+def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
+    """Whose markers are meant. counts: {subject: its markers}; wanted: by the user, None for the only body.
+
+    InputError, which lists them, where there are several bodies or not the one wanted.
+    """
+    named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
+    if wanted is not None and wanted.strip():
+        if not named:
+            found = f"no subject {wanted.strip()[:60]!r}"
+            raise InputError(path, found, "no choice, since its labels name nobody", "leave out --subject")
+        for name in counts:
+            if name.lower() == wanted.strip().lower():
+                return name
+        raise InputError(path, f"no subject {wanted.strip()[:60]!r}", f"one of {named}", "choose one with --subject")
+    bodies = [name for name, count in counts.items() if count >= FEWEST_OF_A_BODY]
+    named_bodies = [name for name in bodies if name]
+    bodies = named_bodies or bodies
+    if len(bodies) > 1:
+        raise InputError(path, f"{len(bodies)} subjects: {named}", "one", "choose one with --subject")
+    return bodies[0] if bodies else max(counts, key=counts.__getitem__)
+
+
+def make_unique(labels: Sequence[str]) -> tuple[list[str], list[str]]:
+    """The labels without repetition, and those that came twice: the second "LASI" is called "LASI (2)". A marker
+    without a label becomes "*1", "*2" ..., as trackers call the unlabeled."""
+    out: list[str] = []
+    taken, twice, unnamed = {label for label in labels if label}, [], 0
+    met: set[str] = set()
+    for label in labels:
+        while not label or label in met:
+            if label:
+                twice.append(label)
+                label = _numbered(label, taken | met)
+            else:
+                unnamed += 1
+                label = f"*{unnamed}" if f"*{unnamed}" not in taken else ""
+        met.add(label)
+        out.append(label)
+    return out, list(dict.fromkeys(twice))
+
+
+def _numbered(label: str, taken: set[str]) -> str:
+    number = 2
+    while f"{label} ({number})" in taken:
+        number += 1
+    return f"{label} ({number})"

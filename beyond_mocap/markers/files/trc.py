@@ -1,8 +1,8 @@
-"""TRC files: markers as text, as Motion Analysis wrote them first and OpenSim does today.
+"""TRC files, read and written: markers as text, as Motion Analysis wrote them first and OpenSim does today.
 
 Five lines of head (kind, names and values of the rate, count and unit, labels, coordinates), then a row for each frame:
 number, time, X Y Z of every marker. There is no standard; blanks, missing cells, decimal commas, line ends and codings
-differ, and are read leniently. What a body would come out wrong by is said.
+differ, and are read leniently. What a body would come out wrong by is said. Written are millimetres, Y up.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...files.content import content
+from ...files.whole import atomic_write
 from ..trial import FEWEST_FPS, MOST_FPS, MarkerTrial
 from .raw_markers import RawMarkers, as_trial
 
@@ -24,6 +25,8 @@ _MISSING = {"", "nan", "-", "na", "n/a", "null", "none", "inf", "-inf"}
 _EXPORT_AGAIN = "export it again"
 _MOST_FRAMES = 2_000_000
 _LARGEST = 4_000_000_000  # bytes
+
+_PLACE = "%.4f\t%.4f\t%.4f"
 
 
 def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: str | None = None,
@@ -91,7 +94,7 @@ def _head(path: Path, lines: list[str]) -> _Head:
     if at is None:
         raise InputError(f"{path}:1", "no line that begins with Frame#", "the head of a TRC file", "choose a TRC file")
     tabs = "\t" in lines[at]
-    below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"[XYZ]\d+$", _first(lines[i]))), None)
+    below = next((i for i in range(at + 1, min(at + 4, len(lines))) if re.match(r"\s*[XYZ]\d+(\s|$)", lines[i])), None)
     named = _cells(lines[at], tabs)
     labels, starts = _labels(path, named, at, tabs)
     if below is not None:
@@ -108,11 +111,6 @@ def _head(path: Path, lines: list[str]) -> _Head:
     columns = np.array(starts)[:, None] + np.array(order)
     return _Head(labels=labels, columns=columns, first_row=(at if below is None else below) + 1, values=values,
                  tabs=tabs, notes=notes)
-
-
-def _first(line: str) -> str:
-    words = line.split()
-    return words[0] if words else ""
 
 
 def _cells(line: str, tabs: bool) -> list[str]:
@@ -211,10 +209,9 @@ def _number(path: Path, cell: str, line: int, column: int) -> float:
     if cell.lower() in _MISSING:
         return math.nan
     try:
-        value = float(cell if "." in cell else cell.replace(",", "."))
+        return float(cell if "." in cell else cell.replace(",", "."))
     except ValueError:
         raise InputError(f"{path}:{line}", f"{cell[:40]!r} in column {column}", "a number", "mend it") from None
-    return value
 
 
 # -- time
@@ -231,7 +228,8 @@ def _on_one_clock(path: Path, head: _Head, times: list[str], positions: np.ndarr
         told = [] if len(times) < 2 else ["no times in the file: frames follow one another at DataRate"]
         return said, 0.0 if not np.isfinite(seconds[:1]).all() else float(seconds[0]), positions, told
     steps = np.diff(seconds)
-    if (steps <= 0).any() and not _only_coarse(steps, coarse, said):
+    only_coarse = bool((steps >= 0).all()) and said > 0 and 1 / said < coarse  # equal times, of few digits
+    if (steps <= 0).any() and not only_coarse:
         frame = int(np.argmax(steps <= 0)) + 2
         found = f"Time of frame {frame} is {times[frame - 1][:20]}, after {times[frame - 2][:20]}"
         raise InputError(path, found, "times that grow", "one recording a file")
@@ -261,11 +259,6 @@ def _seconds(times: list[str]) -> tuple[np.ndarray, float]:
     digits = max((len(text.partition(".")[2]) for text in texts[:100] if "e" not in text.lower()), default=6)
     seconds = np.array([value(text) for text in texts])
     return np.where(np.abs(seconds) < 1e7, seconds, np.nan), 10.0 ** -digits
-
-
-def _only_coarse(steps: np.ndarray, coarse: float, said: float) -> bool:
-    """Whether equal times follow from few digits."""
-    return bool((steps >= 0).all()) and said > 0 and 1 / said < coarse
 
 
 def _rate(said: float, seconds: np.ndarray, steps: np.ndarray, coarse: float) -> tuple[float, list[str]]:
@@ -299,3 +292,30 @@ def _with_gaps(path: Path, frames: np.ndarray, positions: np.ndarray, told: list
     whole = np.full((count, *positions.shape[1:]), np.nan)
     whole[frames] = positions
     return whole, [*told, f"{missing} frames that the times leave out, not seen"]
+
+
+def write_trc(trial: MarkerTrial, path: str | os.PathLike) -> None:
+    """Write a trial; cells of markers that are not seen stay empty. InputError where it cannot be written."""
+    atomic_write(path, trc_text(trial, Path(path).name))
+
+
+def trc_text(trial: MarkerTrial, name: str = "") -> str:
+    """The text of a TRC file; `name` stands in its first line."""
+    labels = [" ".join(label.split()) for label in trial.labels]
+    count, rate = len(labels), f"{trial.fps:.6f}"
+    head = [f"PathFileType\t4\t(X/Y/Z)\t{name or trial.name}",
+            "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+            f"{rate}\t{rate}\t{len(trial)}\t{count}\tmm\t{rate}\t1\t{len(trial)}",
+            "Frame#\tTime\t" + "\t".join(f"{label}\t\t" for label in labels),
+            "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, count + 1)), ""]
+    places = 1000.0 * trial.positions[..., [0, 2, 1]] * np.array([1.0, 1.0, -1.0])
+    rows = [f"{i}\t{seconds:.7f}\t{_row_text(frame, seen)}"
+            for i, (seconds, frame, seen) in enumerate(zip(trial.seconds, places, trial.seen), 1)]  # fmt: skip
+    return "\n".join([*head, *rows, ""])
+
+
+def _row_text(places: np.ndarray, seen: np.ndarray) -> str:
+    """One frame's (M, 3) places in millimetres; empty cells where a marker is not seen."""
+    if seen.all():
+        return "\t".join([_PLACE] * len(seen)) % tuple(places.ravel().tolist())
+    return "\t".join(_PLACE % tuple(place) if there else "\t\t" for place, there in zip(places.tolist(), seen))

@@ -1,21 +1,38 @@
-"""A model from one frame of markers: the static trial's mean, or a chosen frame of the motion itself."""
+"""Models put together: from one frame of markers (of the motion, or a static trial's mean), and models of several
+sessions made one of the subject (Fredriksson §5.2).
+
+A standing body breathes and sways. Averaging places would shrink what turns; so each cluster of a static trial is
+averaged in its own technical frame, and the frames against those of the segments they hang on, from the root outwards.
+
+A body's bones are the same on every day, only the markers lie elsewhere, and what is found of the bones differs by how
+they lay. Segment by segment, from the root down, the sessions' frames are turned onto each other where the centres of
+the joints below say that they differ; these centres are then averaged in the turned frames, those that are surer
+counting more; and the markers of each session go along with their segment.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...base.errors import InputError
 from ...motion.skeleton import Skeleton
+from ..cleaning.cluster_shape import mean_shape, medians, quantile
+from ..frames import RigidFit, mean_rotation, placed, rigid_fit, taken_back
+from ..trial import MarkerTrial
 from .centres import Centres, predict
-from .joint_freedom import freedom_of
 from .marker_set import MarkerSet
-from .model import MarkerModel
+from .model import MarkerModel, freedom_of
 from .template import JOINTS, PARENTS, SCAPULAE
 
-SIGMA = 0.008
-"""How far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)."""
+SIGMA = 0.008  # how far skin markers stray, metres, until a motion tells; how far edges stray is left open (NaN)
+
+_STILL = 0.1  # nobody who stands still moves faster than this, m/s (median of the markers over a second)
+
+_ROUNDS = 4
+_SURE = 1e-4  # metres: no centre is surer
 
 
 def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> dict[str, np.ndarray]:
@@ -28,45 +45,34 @@ def landmark_places(frame: Mapping[str, np.ndarray], marker_set: MarkerSet) -> d
     return found
 
 
-def model_from_frame(
-    frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "", session: str = ""
-) -> MarkerModel:
-    """The model that one frame gives, with predicted joint centres.
+def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, standing: bool = True, subject: str = "",
+                     session: str = "") -> MarkerModel:
+    """The model that one frame gives, with predicted joint centres, on which each marker lies where it was seen.
 
     frame: label -> (3,) m, Z up, NaN where not seen. standing: whether it is a static trial's frame. InputError where
     too few landmarks are marked.
     """
     centres = predict(landmark_places(frame, marker_set), standing)
     carried = {label: marker_set.segment_of(label) for label in frame if np.isfinite(frame[label]).all()}
-    return model_from_centres(centres, frame, carried, marker_set=marker_set, subject=subject, session=session)
-
-
-def model_from_centres(
-    centres: Centres, frame: Mapping[str, np.ndarray], carried: Mapping[str, str | None], marker_set: MarkerSet,
-    subject: str = "", session: str = "",
-) -> MarkerModel:
-    """The model with these joint centres and axes, on which each marker of the frame lies where it was seen."""
     names = _joint_names(centres, set(carried.values()))
     skeleton, axes, places = _skeleton(centres, names)
     labels, joints, on = [], [], []
     for label in marker_set.labels:
         joint = carried.get(label)
-        if joint is None or joint not in names:
-            continue
-        index = names.index(joint)
-        labels.append(label)
-        joints.append(index)
-        on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
+        if joint in names:
+            index = names.index(joint)
+            labels.append(label)
+            joints.append(index)
+            on.append(axes[index].T @ (np.asarray(frame[label], dtype=float) - places[index]))
     if not labels:
         raise InputError("model", "no marker on any joint", "markers of the set", "check labels and marker set")
     counts = {name: joints.count(index) for index, name in enumerate(names)}
     freedom, stiffness = freedom_of(names, skeleton.parents, counts)
-    return MarkerModel(
-        skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
-        sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
-        stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]), subject=subject,
-        sessions=(session,) if session else (), set_name=marker_set.name, notes=tuple(centres.notes),
-    )
+    return MarkerModel(skeleton=skeleton, markers=tuple(labels), joint=np.array(joints), places=np.array(on),
+                       sigma=np.full(len(labels), SIGMA), edge_sigma=np.full(len(labels), np.nan), freedom=freedom,
+                       stiffness=stiffness, centre_sigma=np.array([centres.sigma[name] for name in names]),
+                       subject=subject, sessions=(session,) if session else (), set_name=marker_set.name,
+                       notes=tuple(centres.notes))
 
 
 def _joint_names(centres: Centres, carriers: set) -> list[str]:
@@ -93,11 +99,167 @@ def _skeleton(centres: Centres, names: list[str]):
     parents = [_parent(name, names) for name in names]
     axes = np.array([centres.axes[name] for name in names])
     places = np.array([centres.places[name] for name in names])
-    offsets = np.array([
-        axes[parent].T @ (places[index] - places[parent]) if parent >= 0 else np.zeros(3)
-        for index, parent in enumerate(parents)
-    ])
+    offsets = np.array([axes[parent].T @ (places[index] - places[parent]) if parent >= 0 else np.zeros(3) for index,
+                        parent in enumerate(parents)])
     tips = [(names.index(joint), place) for joint, place in centres.tips.items() if joint in names]
     ends = [axes[joint].T @ (place - places[joint]) for joint, place in tips]
     skeleton = Skeleton(tuple(names), tuple(parents), offsets, tuple(joint for joint, _ in tips), np.array(ends))
     return skeleton, axes, places
+
+
+def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
+                 seconds: float = 2.0) -> dict[str, np.ndarray]:
+    """The markers of a static trial as one frame: label -> (3,) m, NaN for what is never seen in its stillest
+    `seconds`.
+
+    clusters: segment (of `template.JOINTS`, others hang on the root) -> labels. Markers of segments with too few for a
+    frame of their own are averaged in the frame of the segment they hang on, and markers of no segment by their places.
+    Raises InputError where nobody stands still.
+    """
+    first, end = stillest(trial, seconds)
+    part = trial.positions[first:end]
+    index = {label: i for i, label in enumerate(trial.labels)}
+    groups = {name: [index[label] for label in labels if label in index] for name, labels in clusters.items()}
+    out = medians(part) + np.where(np.isfinite(part).any(axis=0), 0.0, np.nan)
+    frames, means = _technical_frames(part, groups), {}
+    order = [name for name in PARENTS if name in groups] + [name for name in groups if name not in PARENTS]
+    for name in order:
+        above = _above(name, means)
+        if name in frames:
+            own = _mean_frame(frames[name], frames.get(above), means.get(above))
+            means[name], above = own, name
+        if above is None:
+            continue
+        local = taken_back(frames[above], part[:, groups[name]])
+        places = medians(local) + np.where(np.isfinite(local).any(axis=0), 0.0, np.nan)
+        laid = placed(means[above], places)
+        out[groups[name]] = np.where(np.isfinite(laid), laid, out[groups[name]])
+    return {label: out[i] for label, i in index.items()}
+
+
+def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
+    """The frames, first and the one after the last, of the `seconds` in which the most is seen and moves the least.
+
+    Raises InputError where somebody walks even there.
+    """
+    length = max(1, min(len(trial), int(round(seconds * trial.fps))))
+    positions = trial.positions
+    step = max(1, int(round(0.1 * trial.fps)))
+    moved = np.full(len(trial), np.nan)
+    if len(trial) > step:
+        speed = np.linalg.norm(positions[step:] - positions[:-step], axis=-1) * trial.fps / step
+        moved[: len(speed)] = quantile(speed, 0.5, axis=1)
+    seen = trial.seen.sum(axis=1)
+    starts = np.unique(np.linspace(0, len(trial) - length, 24).astype(int))
+    unrest = [(-round(float(seen[a : a + length].mean())), float(medians(moved[a : a + length]))) for a in starts]
+    best = min(range(len(starts)), key=lambda i: unrest[i])
+    if unrest[best][1] > _STILL:
+        raise InputError(trial.name, f"its stillest {length / trial.fps:.1f} s still move at {unrest[best][1]:.2f} m/s",
+                         "a static trial, in which somebody stands", "choose another, or go without")
+    return int(starts[best]), int(starts[best]) + length
+
+
+def _technical_frames(part, groups):
+    """{segment: its frames in the world} of the clusters that determine one in nearly every frame."""
+    frames = {}
+    for name, group in groups.items():
+        if len(group) < 3:
+            continue
+        shape = mean_shape(part[:, group])
+        fit = rigid_fit(shape.places, part[:, group], 1.0 / (shape.sigma**2 + 0.001**2))
+        if fit.sound.mean() > 0.5:
+            frames[name] = RigidFit(*(np.where(_wide(fit.sound, each), each, np.nan) for each in fit[:3]), fit.sound)
+    return frames
+
+
+def _wide(flags, like):
+    """Flags (T,) with as many axes as `like` (T, ...)."""
+    return flags.reshape(-1, *[1] * (like.ndim - 1))
+
+
+def _above(name, means):
+    """The nearest segment above with a frame that is averaged already; the first of all where there is none."""
+    parent = PARENTS.get(name)
+    while parent is not None and parent not in means:
+        parent = PARENTS.get(parent)
+    return parent if parent is not None else next(iter(means), None)
+
+
+def _mean_frame(own, above, mean_above):
+    """The mean of frames `own`, against the segment `above` and its mean, or in the world where there is none."""
+    if above is None:
+        return RigidFit(mean_rotation(own.rotation), medians(own.shift), np.zeros(()), np.ones((), dtype=bool))
+    turn = np.einsum("tji,tjk->tik", above.rotation, own.rotation)
+    shift = taken_back(above, own.shift[:, None])[:, 0]
+    rotation = mean_above.rotation @ mean_rotation(turn)
+    return RigidFit(rotation, placed(mean_above, medians(shift)[None])[0], np.zeros(()), np.ones((), dtype=bool))
+
+
+def subject_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
+    """The models of one subject's sessions, all with the same skeleton, in their order.
+
+    InputError where they are none, or their joints differ: sessions of another marker set, or another body's.
+    """
+    if not models:
+        raise InputError("models", "none given", "at least one")
+    _check_alike(models)
+    first = models[0].skeleton
+    worth = np.array([1.0 / np.maximum(model.centre_sigma, _SURE) ** 2 for model in models])
+    offsets = np.array([model.skeleton.offsets for model in models])
+    mean = np.average(offsets, axis=0, weights=np.broadcast_to(worth[:, :, None], offsets.shape))
+    turns = np.tile(np.eye(3), (len(models), len(first), 1, 1))
+    for joint in range(len(first)):
+        below = list(first.children(joint))
+        if not below:
+            continue
+        for _ in range(_ROUNDS if len(below) > 1 else 1):
+            for number in range(len(models)):
+                turns[number, joint] = _turn_onto(offsets[number, below], mean[below], worth[number, below])
+            turned = np.einsum("sij,snj->sni", turns[:, joint], offsets[:, below])
+            mean[below] = np.average(turned, axis=0, weights=np.broadcast_to(worth[:, below, None], turned.shape))
+    ends = np.mean([model.skeleton.end_offsets for model in models], axis=0)
+    skeleton = Skeleton(first.names, first.parents, mean, first.end_parents, ends)
+    sessions = tuple(dict.fromkeys(name for model in models for name in model.sessions))
+    sigma = _agreement(worth, offsets, mean)
+    return tuple(_on(model, skeleton, turn, sessions, sigma) for model, turn in zip(models, turns))
+
+
+def _check_alike(models: Sequence[MarkerModel]) -> None:
+    for model in models[1:]:
+        one, other = models[0].skeleton, model.skeleton
+        if (one.names, one.parents, one.end_parents) != (other.names, other.parents, other.end_parents):
+            odd = sorted(set(one.names) ^ set(other.names))
+            raise InputError("models", f"joints that not all sessions have: {', '.join(odd) or 'in another order'}",
+                             "sessions of one subject with the same joints")  # fmt: skip
+
+
+def _turn_onto(own: np.ndarray, mean: np.ndarray, worth: np.ndarray) -> np.ndarray:
+    """The rotation (3, 3) about the joint that brings the centres below it (N, 3) nearest to their means: none for a
+    single one, whose direction all frames share, as rest poses have it."""
+    if len(own) < 2:
+        return np.eye(3)
+    joint, held = [[0.0, 0.0, 0.0]], np.r_[worth.max() * 100.0, worth]  # the joint itself stays
+    fit = rigid_fit(np.vstack([joint, own]), np.vstack([joint, mean]), held)
+    return fit.rotation if fit.sound else np.eye(3)
+
+
+def _on(model: MarkerModel, skeleton: Skeleton, turn: np.ndarray, sessions, sigma) -> MarkerModel:
+    """A session's model on the subject's skeleton: markers turn with their segment, and those along a bone that became
+    longer or shorter keep their share of it."""
+    places = np.einsum("mij,mj->mi", turn[model.joint], model.places)
+    for joint in range(len(skeleton)):
+        below = skeleton.children(joint)
+        if len(below) != 1:
+            continue
+        old, new = model.skeleton.offsets[below[0]], skeleton.offsets[below[0]]
+        mine = np.flatnonzero(model.joint == joint)
+        share = np.clip(places[mine] @ old / max(old @ old, 1e-9), 0.0, 1.0)
+        places[mine] += share[:, None] * (new - old)
+    return replace(model, skeleton=skeleton, places=places, sessions=sessions, centre_sigma=sigma)
+
+
+def _agreement(worth: np.ndarray, offsets: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """(J,) m, how uncertain a centre is after averaging: what each session says of itself, or how far they differ."""
+    told = 1.0 / np.sqrt(worth.sum(axis=0))
+    apart = np.linalg.norm(np.sqrt(np.mean((offsets - mean) ** 2, axis=0)), axis=-1) / np.sqrt(len(offsets))
+    return np.maximum(told, apart)

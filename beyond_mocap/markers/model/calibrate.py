@@ -24,15 +24,12 @@ from ...motion.motion import Motion, forward_kinematics
 from ..frames import rigid_fit
 from ..pose.chain import chain
 from ..pose.pose import PoseSettings, Solved, solve
-from ..pose.residuals import seen_markers
-from ..pose.weights import cluster_deviation, edge_deviation
+from ..pose.residuals import cluster_deviation, edge_deviation, seen_markers
 from ..trial import MarkerTrial
 from .adjustment import Adjustment, Body, Prior, Pull
-from .assemble import SIGMA, model_from_frame
-from .joint_freedom import freedom_of
+from .assemble import SIGMA, model_from_frame, static_frame
 from .marker_set import MarkerSet
-from .model import MarkerModel
-from .static import static_frame
+from .model import MarkerModel, freedom_of
 
 FRAMES = 60
 _STATIC_FRAMES = 4
@@ -44,25 +41,12 @@ _UNTOLD = 0.001  # m: what no motion can tell stays as predicted
 _FAR, _FAR_BESIDE = 2.0, 0.005  # a frame is passed over that fits so many times, and m, worse than the middle one
 _LIMBS = {"ForeArm": 1, "Hand": 1, "Leg": 2, "Foot": 2}
 """Bones that lie exactly along an axis: joint at their end -> axis."""
+_CANDIDATES = 400  # frames of a motion of which those are chosen that are as unlike as can be
+_FRAMES, _FEWEST = 40, 3  # frames that place a marker that was not shown at first, and in which it has to be seen
 
 
-# Which frames of a motion a model is made from: upright ones, and ones as unlike as can be.
-
-
-_CANDIDATES = 400
-
-
-# Markers that the static trial, or the frames that a model began with, did not show: placed where the motion has
-# them.
-
-
-_FRAMES = 40
-_FEWEST = 3  # frames in which a marker has to be seen
-
-
-def with_late_markers(
-    model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial, cancelled: Callable[[], bool] | None = None
-) -> MarkerModel:
+def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTrial,
+                      cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model with the set's markers that it lacks and the trial shows, and joints freed that they now tell.
 
     Each lies at the median of where it is seen in its segment's frame, over some frames solved without it.
@@ -96,13 +80,10 @@ def _added(model: MarkerModel, labels: list[str], joints: list[int], places: lis
     joint = np.concatenate([model.joint, joints])
     counts = {name: int(np.sum(joint == index)) for index, name in enumerate(model.skeleton.names)}
     freedom, stiffness = freedom_of(model.skeleton.names, model.skeleton.parents, counts)
-    return replace(
-        model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
-        sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
-        edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]),
-        freedom=freedom, stiffness=stiffness,
-        notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"),
-    )
+    return replace(model, markers=(*model.markers, *labels), joint=joint, places=np.concatenate([model.places, places]),
+                   sigma=np.concatenate([model.sigma, np.full(len(labels), SIGMA)]),
+                   edge_sigma=np.concatenate([model.edge_sigma, np.full(len(labels), np.nan)]), freedom=freedom,
+                   stiffness=stiffness, notes=(*model.notes, f"placed by the motion alone: {', '.join(labels)}"))
 
 
 def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], count: int) -> list[int]:
@@ -119,7 +100,9 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
         names = [f"{side}_asis", f"{side}_knee_lateral", f"{side}_ankle_lateral"]
         if all(name in at for name in names):
             hip, knee, ankle = (at[name] for name in names)
-            cost += np.nan_to_num(1.0 - _cosine(hip - knee, knee - ankle), nan=1.0) * 2.0
+            length = np.linalg.norm(hip - knee, axis=-1) * np.linalg.norm(knee - ankle, axis=-1)
+            cosine = np.sum((hip - knee) * (knee - ankle), axis=-1) / np.maximum(length, 1e-9)
+            cost += np.nan_to_num(1.0 - cosine, nan=1.0) * 2.0
             cost += np.nan_to_num(np.maximum(_tilt(knee - ankle) - 0.1, 0.0), nan=0.5)
     if "c7" in at and "left_asis" in at and "right_asis" in at:
         cost += np.nan_to_num(_tilt(at["c7"] - 0.5 * (at["left_asis"] + at["right_asis"])), nan=0.5)
@@ -131,11 +114,6 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
         if all(abs(int(frame) - other) >= apart for other in chosen):
             chosen.append(int(frame))
     return chosen
-
-
-def _cosine(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    length = np.linalg.norm(a, axis=-1) * np.linalg.norm(b, axis=-1)
-    return np.sum(a * b, axis=-1) / np.maximum(length, 1e-9)
 
 
 def _tilt(v: np.ndarray) -> np.ndarray:
@@ -172,13 +150,9 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
     return np.sort(frames[chosen])
 
 
-def calibrate(
-    marker_set: MarkerSet,
-    trial: MarkerTrial,
-    static: MarkerTrial | None = None,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> MarkerModel:
+def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | None = None,
+              progress: Callable[[float, str], None] | None = None,
+              cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model of the body in `trial`.
 
     trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
@@ -219,10 +193,8 @@ def from_static(marker_set: MarkerSet, static: MarkerTrial) -> MarkerModel:
 def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
     """The mean of the models that some upright frames of a motion give."""
     index = {label: i for i, label in enumerate(trial.labels)}
-    landmarks = {
-        name: tuple(index[label] for label in labels)
-        for name, labels in marker_set.landmarks.items() if all(label in index for label in labels)
-    }
+    landmarks = {name: tuple(index[label] for label in labels) for name,
+                 labels in marker_set.landmarks.items() if all(label in index for label in labels)}
     found, reason = [], None
     for frame in neutral_frames(trial, landmarks, _NEUTRAL_FRAMES):
         places = dict(zip(trial.labels, trial.positions[frame]))
@@ -234,27 +206,22 @@ def from_motion(marker_set: MarkerSet, trial: MarkerTrial) -> MarkerModel:
         raise reason or InputError(trial.name, "no frames")
     most = max(found, key=lambda model: (len(model.skeleton), len(model.markers)))
     alike = [m for m in found if m.skeleton.names == most.skeleton.names and m.markers == most.markers]
-    skeleton = replace(
-        most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
-        end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0),
-    )
+    skeleton = replace(most.skeleton, offsets=np.mean([m.skeleton.offsets for m in alike], axis=0),
+                       end_offsets=np.mean([m.skeleton.end_offsets for m in alike], axis=0))
     note = f"no static trial: begun with {len(alike)} upright frame{'s' if len(alike) > 1 else ''} of the motion"
     places = np.mean([m.places for m in alike], axis=0)
     return replace(most, skeleton=skeleton, places=places, notes=(*most.notes, note))
 
 
-def refined(
-    model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None = None,
-    cancelled: Callable[[], bool] = lambda: False, frames: int = FRAMES, worth: float = _WORTH,
-    place_sigma: float = _PLACE_SIGMA,
-) -> MarkerModel:
+def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
+            cancelled: Callable[[], bool]) -> MarkerModel:
     """The model adjusted to the motion: joint centres, bone lengths and markers' places, each by its uncertainty."""
-    part = _chosen(model, trial, static, frames)
+    part = _chosen(model, trial, static)
     solved = solve(model, part, PoseSettings(weights=False, limits=False), cancelled=cancelled)
     motion, part = _sane(solved, part)
     body = _body(model)
-    task = Adjustment(body, _prior(model, place_sigma), _pull(model), seen=seen_markers(model, part),
-                      sigma=_sigmas(model), worth=worth)
+    task = Adjustment(body, _prior(model), _pull(model), seen=seen_markers(model, part),
+                      sigma=np.maximum(model.sigma, 0.004), worth=_WORTH)
     task.start(motion)
     for _ in range(2):
         if cancelled():
@@ -263,20 +230,18 @@ def refined(
         task.sigma = _scatter(task.residuals())
     skeleton = replace(model.skeleton, offsets=body.offsets)
     deviation = edge_deviation(model.joint, body.places, seen_markers(model, part))
-    return replace(
-        model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
-        edge_sigma=cluster_deviation(model.joint, deviation),
-    )
+    return replace(model, skeleton=skeleton, places=body.places, sigma=task.sigma, centre_sigma=task.uncertainty(),
+                   edge_sigma=cluster_deviation(model.joint, deviation))
 
 
-def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None, count: int) -> MarkerTrial:
+def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) -> MarkerTrial:
     """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
 
     They are no neighbours in time, which the rate of one frame a second tells whoever solves them.
     """
     root = [i for i, label in enumerate(trial.labels) if label in model.markers
             and model.joint[model.markers.index(label)] == 0]
-    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), count)]
+    positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), FRAMES)]
     if static is not None:
         still = seen_markers(model, static)[np.unique(np.linspace(0, len(static) - 1, _STATIC_FRAMES).astype(int))]
         positions = np.concatenate([still, positions])
@@ -295,22 +260,18 @@ def _sane(solved: Solved, part: MarkerTrial) -> tuple[Motion, MarkerTrial]:
     return kept, part.with_positions(part.positions[good])
 
 
-def _part(name: str) -> str:
-    return name.removeprefix("Left").removeprefix("Right")
-
-
 def _body(model: MarkerModel) -> Body:
     names = model.skeleton.names
-    limb = np.array([_LIMBS.get(_part(name), -1) for name in names])
+    limb = np.array([_LIMBS.get(name.removeprefix("Left").removeprefix("Right"), -1) for name in names])
     held = ~model.freedom.free.any(axis=1)
     return Body(names=names, parents=model.skeleton.parents, offsets=model.skeleton.offsets.copy(), joint=model.joint,
                 places=model.places.copy(), held=held, limb=limb)
 
 
-def _prior(model: MarkerModel, place_sigma: float) -> Prior:
+def _prior(model: MarkerModel) -> Prior:
     sigma = np.maximum(model.centre_sigma, 0.003)
     above = sigma[np.maximum(model.skeleton.parents, 0)]
-    places = np.full(len(model.joint), place_sigma)
+    places = np.full(len(model.joint), _PLACE_SIGMA)
     held = ~model.freedom.free.any(axis=1)
     offsets = np.where(held, _UNTOLD, np.sqrt(sigma**2 + above**2))
     return Prior(offsets=model.skeleton.offsets.copy(), offset_sigma=offsets, places=model.places.copy(),
@@ -333,10 +294,6 @@ def _pull(model: MarkerModel) -> Pull:
     freedom = model.freedom
     runs = chain(model.skeleton, model.joint, model.places, freedom.order, freedom.free).runs
     return Pull(play, runs)
-
-
-def _sigmas(model: MarkerModel) -> np.ndarray:
-    return np.maximum(model.sigma, 0.004)
 
 
 def _scatter(residuals: np.ndarray) -> np.ndarray:

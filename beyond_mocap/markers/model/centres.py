@@ -150,9 +150,7 @@ def _harrington(points: Mapping[str, np.ndarray]) -> dict[str, np.ndarray] | Non
     front, depth = front - MARKER_RADIUS * axes[:, 0], np.linalg.norm(front - back) - 2.0 * MARKER_RADIUS
     width = np.linalg.norm(across)
     ahead, up, side = -0.24 * depth - 0.0099, -0.30 * width - 0.0109, 0.33 * width + 0.0073
-    return {
-        name: front + axes @ np.array([ahead, sign * side, up]) for name, sign in (("Left", 1.0), ("Right", -1.0))
-    }
+    return {name: front + axes @ np.array([ahead, sign * side, up]) for name, sign in (("Left", 1.0), ("Right", -1.0))}
 
 
 def _thorax(out: Centres, points: Mapping[str, np.ndarray]) -> None:

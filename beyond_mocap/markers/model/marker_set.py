@@ -1,4 +1,5 @@
-"""Which markers a recording has on which part of the body, and which anatomical points they mark.
+"""Which markers a recording has on which part of the body, which anatomical points they mark, and a trial under the
+set's names.
 
 A set knows no coordinates. Its segments say which joint carries a marker; its landmarks say what the marker lies on,
 and that is all that joint centres are found from (`centres`): a set of one's own needs no rules, only names.
@@ -11,9 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+import numpy as np
+
 from ...base.errors import InputError
-from .landmarks import LANDMARKS
-from .template import JOINTS
+from ..trial import MarkerTrial, list_some
+from .template import JOINTS, LANDMARKS
 
 UNLABELED = re.compile(r"^(\*\d+|[UuxX]_?\d+|C_\d+|[Uu]nlabell?ed.*|[Uu]nnamed.*)$")
 """Labels that recording software gives to markers that nobody has named."""
@@ -25,7 +28,7 @@ class MarkerSet:
     """The markers of one protocol.
 
     name: one word. segments: joint name (of `template.JOINTS`) -> labels of the markers that it carries.
-    landmarks: anatomical point (of `landmarks.LANDMARKS`) -> labels; several mark it by their mean.
+    landmarks: anatomical point (of `template.LANDMARKS`) -> labels; several mark it by their mean.
     aliases: another label -> the set's own. static: markers that may be missing in all but the static trial.
     optional: markers that may be missing anywhere. ball: markers on a ball. other: markers on things that are no body.
     about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments.
@@ -128,8 +131,9 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
     missing = sorted(nearest.needed - present)
     unknown = sorted(set(named) - set(nearest.renaming(named)) - set(nearest.labels))
     raise InputError(
-        "markers", f"no marker set fits; nearest is {nearest.name}, of which {_some(missing)} missing"
-        + (f" ({_some(unknown, 'not in it')})" if unknown else ""),
+        "markers", f"no marker set fits; nearest is {nearest.name}, of which "
+        + f"{list_some(missing, 8)} {'is' if len(missing) == 1 else 'are'} missing"
+        + (f" ({list_some(unknown, 8)} not in it)" if unknown else ""),
         "all markers of one set", "give a marker set of your own (--marker-set)",
     )
 
@@ -143,8 +147,46 @@ def _plain(label: str) -> str:
     return re.sub(r"[\s_\-.]", "", label).lower()
 
 
-def _some(names: Sequence[str], what: str = "") -> str:
-    """`4 are: A, B, C and 1 more`, or with `what` in place of `are`."""
-    shown = ", ".join(names[:8]) + (f" and {len(names) - 8} more" if len(names) > 8 else "")
-    verb = what or ("is" if len(names) == 1 else "are")
-    return f"{shown} {verb}"
+def named_as(trial: MarkerTrial, marker_set: MarkerSet) -> MarkerTrial:
+    """The trial under the set's names.
+
+    A set may say which unlabeled marker is which (`also LHAND: x52`), but recording software numbers these anew in
+    every trial: where both of a left and a right one have come so, each goes to the side whose markers it is near to.
+    """
+    names = marker_set.renaming(trial.labels)
+    chance = {new: old for old, new in names.items() if UNLABELED.match(old)}
+    for new, old in chance.items():
+        twin = _twin(new, marker_set, chance)
+        if twin and _side(marker_set, new) == "Left":
+            kept = [_apart(trial, one, marker_set, "Left") + _apart(trial, other, marker_set, "Right")
+                    for one, other in ((old, chance[twin]), (chance[twin], old))]
+            if kept[1] < kept[0]:
+                names[old], names[chance[twin]] = twin, new
+    return trial.renamed(names)
+
+
+def _side(marker_set: MarkerSet, label: str) -> str:
+    segment = marker_set.segment_of(label) or ""
+    return next((side for side in ("Left", "Right") if segment.startswith(side)), "")
+
+
+def _twin(label: str, marker_set: MarkerSet, among) -> str | None:
+    """The label on the other side's segment that is called alike."""
+    segment = marker_set.segment_of(label) or ""
+    other = segment.replace("Left", "Right") if "Left" in segment else segment.replace("Right", "Left")
+    there = [x for x in marker_set.segments.get(other, ()) if x in among and x[1:] == label[1:]]
+    return there[0] if there and other != segment else None
+
+
+def _apart(trial: MarkerTrial, label: str, marker_set: MarkerSet, side: str) -> float:
+    """Metres on average from a marker to the nearest of the side's own."""
+    own = trial.positions[:, trial.index(label)]
+    best = np.inf
+    for segment, labels in marker_set.segments.items():
+        for other in labels:
+            if segment.startswith(side) and other in trial.labels and other != label:
+                apart = np.linalg.norm(trial.positions[:, trial.index(other)] - own, axis=-1)
+                apart = apart[np.isfinite(apart)]
+                if len(apart):
+                    best = min(best, float(apart.mean()))
+    return best

@@ -1,4 +1,5 @@
-"""The skeleton that markers are fitted to, and a typical body on it: where joints and landmarks of an adult lie.
+"""The skeleton that markers are fitted to, the anatomical points that markers lie on, and where both lie on a typical
+body. Every marker set translates its labels into these landmarks.
 
 Joints are named as Mixamo and LAFAN1 do. In the rest pose the body stands in a T-pose facing +X, thumbs forward, and
 all joints' frames are the world's: X forward, Y left, Z up. Thus an arm's long axis is Y (left: outwards), a leg's -Z,
@@ -19,74 +20,62 @@ import numpy as np
 STATURE = 1.80
 
 # joint, parent, place in the T-pose in metres (forward, left, up) from the middle between the hips; left side
-_TRUNK = (
-    ("Hips", None, (0.0, 0.0, 0.0)),
-    ("Spine", "Hips", (0.005, 0.0, 0.114)),
-    ("Spine1", "Spine", (-0.015, 0.0, 0.250)),
-    ("Chest", "Spine1", (-0.050, 0.0, 0.370)),
-    ("Neck", "Chest", (-0.030, 0.0, 0.560)),
-    ("Neck1", "Neck", (-0.015, 0.0, 0.615)),
-    ("Head", "Neck1", (0.000, 0.0, 0.670)),
-)
-_ARM = (
-    ("Shoulder", "Chest", (0.035, 0.025, 0.500)),
-    ("Scapula", "Shoulder", (-0.015, 0.165, 0.545)),
-    ("Arm", "Scapula", (-0.020, 0.175, 0.505)),
-    ("ForeArm", "Arm", (-0.020, 0.475, 0.505)),
-    ("Hand", "ForeArm", (-0.020, 0.735, 0.505)),
-)
-_LEG = (
-    ("UpLeg", "Hips", (0.000, 0.086, 0.000)),
-    ("Leg", "UpLeg", (0.000, 0.086, -0.430)),
-    ("Foot", "Leg", (0.000, 0.086, -0.865)),
-    ("ToeBase", "Foot", (0.135, 0.086, -0.908)),
-)
-_TIPS = {
-    "Head": (0.010, 0.0, 0.865),
-    "LeftHand": (-0.020, 0.925, 0.505),
-    "LeftToeBase": (0.210, 0.086, -0.920),
-}
+_TRUNK = (("Hips", None, (0.0, 0.0, 0.0)), ("Spine", "Hips", (0.005, 0.0, 0.114)),
+          ("Spine1", "Spine", (-0.015, 0.0, 0.250)), ("Chest", "Spine1", (-0.050, 0.0, 0.370)),
+          ("Neck", "Chest", (-0.030, 0.0, 0.560)), ("Neck1", "Neck", (-0.015, 0.0, 0.615)),
+          ("Head", "Neck1", (0.000, 0.0, 0.670)))
+_ARM = (("Shoulder", "Chest", (0.035, 0.025, 0.500)), ("Scapula", "Shoulder", (-0.015, 0.165, 0.545)),
+        ("Arm", "Scapula", (-0.020, 0.175, 0.505)), ("ForeArm", "Arm", (-0.020, 0.475, 0.505)),
+        ("Hand", "ForeArm", (-0.020, 0.735, 0.505)))
+_LEG = (("UpLeg", "Hips", (0.000, 0.086, 0.000)), ("Leg", "UpLeg", (0.000, 0.086, -0.430)),
+        ("Foot", "Leg", (0.000, 0.086, -0.865)), ("ToeBase", "Foot", (0.135, 0.086, -0.908)))
+_TIPS = {"Head": (0.010, 0.0, 0.865), "LeftHand": (-0.020, 0.925, 0.505), "LeftToeBase": (0.210, 0.086, -0.920)}
 SCAPULAE = ("LeftScapula", "RightScapula")
 
 # landmark -> the joint that carries it and its place as above; left side
 _LANDMARKS = {
-    "left_asis": ("Hips", (0.062, 0.120, 0.072)),
-    "left_psis": ("Hips", (-0.090, 0.045, 0.103)),
-    "sacrum": ("Hips", (-0.092, 0.0, 0.103)),
-    "left_iliac_crest": ("Hips", (-0.010, 0.145, 0.125)),
-    "c7": ("Chest", (-0.085, 0.0, 0.567)),
-    "t7": ("Chest", (-0.125, 0.0, 0.420)),
-    "t10": ("Chest", (-0.115, 0.0, 0.290)),
-    "jugular_notch": ("Chest", (0.055, 0.0, 0.500)),
-    "sternum": ("Chest", (0.105, 0.0, 0.330)),
-    "left_scapula": ("Chest", (-0.130, 0.085, 0.420)),
-    "left_acromion": ("LeftShoulder", (-0.020, 0.175, 0.560)),
-    "head_front": ("Head", (0.115, 0.0, 0.770)),
-    "head_back": ("Head", (-0.100, 0.0, 0.750)),
-    "head_top": ("Head", (0.010, 0.0, 0.865)),
-    "left_temple": ("Head", (0.085, 0.072, 0.785)),
-    "left_occiput": ("Head", (-0.080, 0.065, 0.745)),
-    "left_elbow_lateral": ("LeftArm", (-0.020, 0.475, 0.548)),
-    "left_elbow_medial": ("LeftArm", (-0.020, 0.475, 0.462)),
+    "left_asis": ("Hips", (0.062, 0.120, 0.072)), "left_psis": ("Hips", (-0.090, 0.045, 0.103)),
+    "sacrum": ("Hips", (-0.092, 0.0, 0.103)), "left_iliac_crest": ("Hips", (-0.010, 0.145, 0.125)),
+    "c7": ("Chest", (-0.085, 0.0, 0.567)), "t7": ("Chest", (-0.125, 0.0, 0.420)),
+    "t10": ("Chest", (-0.115, 0.0, 0.290)), "jugular_notch": ("Chest", (0.055, 0.0, 0.500)),
+    "sternum": ("Chest", (0.105, 0.0, 0.330)), "left_scapula": ("Chest", (-0.130, 0.085, 0.420)),
+    "left_acromion": ("LeftShoulder", (-0.020, 0.175, 0.560)), "head_front": ("Head", (0.115, 0.0, 0.770)),
+    "head_back": ("Head", (-0.100, 0.0, 0.750)), "head_top": ("Head", (0.010, 0.0, 0.865)),
+    "left_temple": ("Head", (0.085, 0.072, 0.785)), "left_occiput": ("Head", (-0.080, 0.065, 0.745)),
+    "left_elbow_lateral": ("LeftArm", (-0.020, 0.475, 0.548)), "left_elbow_medial": ("LeftArm", (-0.020, 0.475, 0.462)),
     "left_wrist_radial": ("LeftForeArm", (0.017, 0.735, 0.510)),
-    "left_wrist_ulnar": ("LeftForeArm", (-0.057, 0.735, 0.510)),
-    "left_wrist": ("LeftForeArm", (-0.020, 0.735, 0.535)),
-    "left_knuckle": ("LeftHand", (-0.010, 0.820, 0.525)),
-    "left_fingertip": ("LeftHand", (-0.010, 0.925, 0.510)),
-    "left_trochanter": ("LeftUpLeg", (-0.010, 0.170, 0.005)),
-    "left_thigh": ("LeftUpLeg", (0.000, 0.160, -0.230)),
+    "left_wrist_ulnar": ("LeftForeArm", (-0.057, 0.735, 0.510)), "left_wrist": ("LeftForeArm", (-0.020, 0.735, 0.535)),
+    "left_knuckle": ("LeftHand", (-0.010, 0.820, 0.525)), "left_fingertip": ("LeftHand", (-0.010, 0.925, 0.510)),
+    "left_trochanter": ("LeftUpLeg", (-0.010, 0.170, 0.005)), "left_thigh": ("LeftUpLeg", (0.000, 0.160, -0.230)),
     "left_knee_lateral": ("LeftUpLeg", (0.000, 0.143, -0.430)),
-    "left_knee_medial": ("LeftUpLeg", (0.000, 0.029, -0.430)),
-    "left_patella": ("LeftUpLeg", (0.060, 0.086, -0.415)),
-    "left_shank": ("LeftLeg", (0.000, 0.140, -0.640)),
-    "left_ankle_lateral": ("LeftLeg", (-0.005, 0.129, -0.868)),
-    "left_ankle_medial": ("LeftLeg", (0.005, 0.043, -0.858)),
-    "left_heel": ("LeftFoot", (-0.070, 0.086, -0.893)),
-    "left_toe": ("LeftFoot", (0.130, 0.090, -0.880)),
-    "left_metatarsal_1": ("LeftFoot", (0.130, 0.056, -0.895)),
-    "left_metatarsal_5": ("LeftFoot", (0.095, 0.135, -0.905)),
-    "left_toe_tip": ("LeftToeBase", (0.200, 0.080, -0.905)),
+    "left_knee_medial": ("LeftUpLeg", (0.000, 0.029, -0.430)), "left_patella": ("LeftUpLeg", (0.060, 0.086, -0.415)),
+    "left_shank": ("LeftLeg", (0.000, 0.140, -0.640)), "left_ankle_lateral": ("LeftLeg", (-0.005, 0.129, -0.868)),
+    "left_ankle_medial": ("LeftLeg", (0.005, 0.043, -0.858)), "left_heel": ("LeftFoot", (-0.070, 0.086, -0.893)),
+    "left_toe": ("LeftFoot", (0.130, 0.090, -0.880)), "left_metatarsal_1": ("LeftFoot", (0.130, 0.056, -0.895)),
+    "left_metatarsal_5": ("LeftFoot", (0.095, 0.135, -0.905)), "left_toe_tip": ("LeftToeBase", (0.200, 0.080, -0.905)),
 }
+
+_CENTRE = (
+    "sacrum",  # between the posterior superior iliac spines
+    "c7", "t7", "t10",  # spinous processes
+    "jugular_notch", "sternum",  # upper and lower end of the breastbone
+    "head_front", "head_back", "head_top",
+)
+_SIDES = (
+    "asis", "psis", "iliac_crest",  # iliac spines; crest at the side
+    "scapula",  # on the blade of the shoulder
+    "acromion",
+    "elbow_lateral", "elbow_medial", "wrist_radial", "wrist_ulnar", "wrist",  # `wrist`: a lone marker on its back
+    "knuckle",  # head of the second or third metacarpal, from the back
+    "fingertip",
+    "trochanter", "thigh",  # `thigh`, `shank`: markers in the plane of hip, knee and ankle, as on Plug-in Gait's wands
+    "knee_lateral", "knee_medial", "patella", "shank", "ankle_lateral", "ankle_medial",
+    "heel", "toe",  # `toe`: head of the second metatarsal, from above
+    "metatarsal_1", "metatarsal_5", "toe_tip",
+    "temple", "occiput",
+)
+LANDMARKS = frozenset((*_CENTRE, *(f"{side}_{name}" for side in ("left", "right") for name in _SIDES)))
+"""All landmarks; those of a limb or half begin with left_ or right_."""
 
 
 def _other(name: str) -> str:
@@ -121,8 +110,7 @@ def _both(table):
 _PARENTS, _PLACES = _joints()
 PARENTS = MappingProxyType(_PARENTS)
 """Joint -> the joint above it, None for the root; parents stand first. Scapulae are left out of most skeletons."""
-JOINTS = tuple(PARENTS)
-"""All joints that a segment may be carried by, parents first."""
+JOINTS = tuple(PARENTS)  # all joints that a segment may be carried by, parents first
 PLACES = MappingProxyType({name: np.array(place) for name, place in _PLACES.items()})
 """Joint -> its place (3,) m in the T-pose of the typical body, from the middle between the hips."""
 TIPS = MappingProxyType({name: np.array(place) for name, place in _both(_TIPS).items()})

@@ -26,7 +26,8 @@ from ...base.errors import InputError
 from ...motion import quaternion
 from ...motion.skeleton import Skeleton
 
-_AXES = {"X": 0, "Y": 1, "Z": 2}
+AXES = {"X": 0, "Y": 1, "Z": 2}
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])[:, None]  # times a quaternion (..., 4, F): its inverse
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -82,9 +83,7 @@ class Chain:
         return replace(self, low=np.where(self.free, -np.inf, 0.0), high=np.where(self.free, np.inf, 0.0))
 
 
-def chain(
-    skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None
-) -> Chain:
+def chain(skeleton: Skeleton, joint, places, order=None, free=None, low=None, high=None, stiffness=None) -> Chain:
     """A chain of these arrays (see `Chain`), whatever is None free of limits and of stiffness. InputError where shapes
     do not fit."""
     count = len(skeleton)
@@ -221,9 +220,9 @@ def own_axes(chain: Chain, joint: int, angles: np.ndarray) -> np.ndarray:
     turned = np.broadcast_to(np.eye(3)[:, :, None], out.shape)
     for angle, letter in enumerate(chain.order[joint]):
         if chain.free[joint, angle]:
-            out[:, angle] = turned[:, _AXES[letter]]
+            out[:, angle] = turned[:, AXES[letter]]
         one = np.zeros((4, angles.shape[-1]))
-        one[0], one[1 + _AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
+        one[0], one[1 + AXES[letter]] = np.cos(0.5 * angles[angle]), np.sin(0.5 * angles[angle])
         turned = np.einsum("abf,bcf->acf", turned, matrices(one))
     return out
 

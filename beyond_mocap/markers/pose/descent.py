@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from . import elimination, limits
-from .chain import Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
+from .chain import CONJUGATE, Chain, Placed, Poses, axes, cross, logarithm, moved, multiply, place
 
 MOST_STEPS = 24
 _NEAR = 0.1  # a step that gains a smaller part of the cost is near enough for second derivatives to help
@@ -20,7 +20,6 @@ _STILL = 1e-5  # radians (and metres): a frame whose step is smaller has arrived
 _NO_GAIN = 1e-7  # as has one whose cost falls by a smaller part
 _TRUSTED = 1e-3  # m2: with more damping a small step says nothing
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-5, 1e-9, 1e3  # m2
-_BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -63,11 +62,9 @@ class Task:
 
     def frames(self, chosen) -> "Task":
         """These frames only."""
-        return replace(
-            self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
-            lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
-            leaning=None if self.leaning is None else self.leaning[:, chosen],
-        )
+        return replace(self, seen=self.seen[..., chosen], weights=self.weights[:, chosen],
+                       lean=self.lean and self.lean.frames(chosen), point=self.point and self.point.frames(chosen),
+                       leaning=None if self.leaning is None else self.leaning[:, chosen])
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +172,7 @@ def _gone(task: Task, at: Poses) -> np.ndarray:
     """How far (J, 3, F) rad each joint is turned from where it leans to, in the same form; nothing without."""
     if task.lean is None:
         return np.zeros((0, 3, at.root.shape[-1]))
-    gone = logarithm(multiply(at.local, task.lean.local * _BACK))
+    gone = logarithm(multiply(at.local, task.lean.local * CONJUGATE))
     for joint in task.chain.hinges:
         gone[joint] = at.angles[joint] - task.lean.angles[joint]
     return gone
@@ -219,9 +216,8 @@ def crosswise(away: np.ndarray, radius: float) -> np.ndarray:
     return np.maximum(away, 0.0) / np.maximum(away + radius, 1e-9)
 
 
-def _step(
-    task: Task, best: State, stops: dict, damping: np.ndarray, curved: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, State]:
+def _step(task: Task, best: State, stops: dict, damping: np.ndarray,
+          curved: np.ndarray) -> tuple[np.ndarray, np.ndarray, State]:
     """One damped step, with second derivatives where `curved` (F,): its size (F,), what limits held still (J, F), and
     the state it leads to."""
     shift, turns, held = _solved(task, best, stops, damping, curved)

@@ -123,10 +123,8 @@ def bends(chain: Chain, placed: Placed, axes: np.ndarray, away: np.ndarray, weig
     return Bends(inner, above)
 
 
-def step(
-    chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray,
-    bent: Bends | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
+def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own, damping: np.ndarray,
+         bent: Bends | None = None) -> tuple[np.ndarray, np.ndarray]:
     """The damped step: the root's shift (3, F) m and all joints' turns (J, 3, F) rad about their axes (J, 3, 3, F).
 
     damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). bent: second derivatives to go

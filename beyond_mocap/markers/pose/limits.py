@@ -16,13 +16,12 @@ import numpy as np
 
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from .chain import Chain, Poses, angles_of, cross, own_axes, within
+from .chain import AXES, Chain, Poses, angles_of, cross, own_axes, within
 from .elimination import Own
 
 _NEAR_POLE = 0.12  # cosine of the middle angle below which the outer ones mean nothing: 7 degrees
 _AT = 1e-7  # radians
 _HELD = 1e6  # curvature, m2 per radian2, of a turn that is held still
-_AXES = {"X": 0, "Y": 1, "Z": 2}
 
 
 def limited(chain: Chain) -> dict[str, np.ndarray]:
@@ -61,7 +60,7 @@ def _bring_back(chain, joint, frames, local, angles, before) -> None:
 
 def _read(q: np.ndarray, order: str) -> np.ndarray:
     """Angles (..., 3, F) rad of rotations (..., 4, F), the middle within a quarter turn; at the pole as they come."""
-    i, j, k = (_AXES[letter] for letter in order)
+    i, j, k = (AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     w, v = q[..., 0, :], [q[..., 1 + axis, :] for axis in (i, j, k)]
     # entries of the rotation's matrix, in the order's own axes
@@ -77,9 +76,8 @@ def _counts(angles: np.ndarray) -> np.ndarray:
     return np.stack([away, np.ones_like(away), away])
 
 
-def hold(
-    chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own, ahead: np.ndarray | None = None
-) -> np.ndarray:
+def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarray, own: Own,
+         ahead: np.ndarray | None = None) -> np.ndarray:
     """Hold still, in place in what is asked of the turns, the angles at a limit that would go on, and let those that a
     first step led over a limit end on it; which joints are held: (J, F) bool.
 

@@ -41,9 +41,8 @@ class PlantFiltered:
     miss: np.ndarray
 
 
-def plant_filter(
-    motion: Motion, window: float = WINDOW, still: float = STILL, ease: float = EASE, apart: float = APART
-) -> PlantFiltered:
+def plant_filter(motion: Motion, window: float = WINDOW, still: float = STILL, ease: float = EASE,
+                 apart: float = APART) -> PlantFiltered:
     """A motion whose ankles and toes stay where they stand.
 
     window, ease: seconds. still, apart: metres, see the module. Only the joints of the legs of frames in which
@@ -145,6 +144,4 @@ class _Foot:
             turned = quaternion.multiply(quaternion.between(along, new), turned)
         chain = (limb.upper_leg, limb.lower_leg, limb.foot)
         soft = 1e-6 + _SOFT * self.weight[now]
-        return bent_limb(
-            skeleton, places, world, chain, ankle + self.ankle_shift[now], end_rotation=turned, soft=soft
-        )
+        return bent_limb(skeleton, places, world, chain, ankle + self.ankle_shift[now], end_rotation=turned, soft=soft)

@@ -16,10 +16,9 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 from ..frames import placed as carried
 from ..frames import rigid_fit
-from . import weights as marker_weights
 from .chain import Chain, Poses, chain, place, poses
 from .descent import HeldPoint, Task, descend
-from .residuals import seen_markers
+from .residuals import marker_weights, seen_markers
 from .smooth import smooth
 from .start import first_poses
 
@@ -32,16 +31,12 @@ _FLIP, _FLIP_SECONDS = np.radians(45.0), 0.1  # a jump in one frame; how long wh
 _EVEN = 0.05  # m per radian: how strongly joints between which no marker stands are held to turn alike
 _LEANING = 0.02  # m per radian: how strongly a joint that misses markers leans on how it stands before and after
 _LEAST_STIFFNESS = 1e-3  # m per radian: what no marker tells stays at rest
-
-
-# Joints whose markers are hidden for a while follow what is solved before and after, not the rest pose.
-
-
 _NEAR = 2  # a joint is told by its own markers and by those of so many joints below it
 
 
 def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
-    """Of which joints markers are hidden that the recording shows elsewhere: (T, J) bool. there: (T, M) bool."""
+    """Of which joints markers are hidden that the recording shows elsewhere: (T, J) bool. there: (T, M) bool. These
+    follow what is solved before and after, not the rest pose."""
     usual = there.any(axis=0)
     out = np.zeros((len(there), len(chain.skeleton)), dtype=bool)
     for marker, joint in enumerate(chain.joint):
@@ -54,21 +49,22 @@ def missing(chain: Chain, there: np.ndarray) -> np.ndarray:
     return out
 
 
-def between(
-    chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray, frames: np.ndarray
-) -> tuple[Poses, np.ndarray]:
+def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
+            frames: np.ndarray) -> tuple[Poses, np.ndarray]:
     """The poses of `frames` (N,) that lie between solved ones, each joint between those that tell it, and of which
     joints any do: (J,) bool.
 
     solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
     telling frame a joint stays as it is there.
     """
-    root = _slid(solved.root[:, known].T, known, frames)
+    places, (before, after, part) = solved.root[:, known].T, _around(known, frames)
+    root = places[before] + part[:, None] * (places[after] - places[before])
     local = np.empty((len(frames), len(chain.skeleton), 4))
     some = told.any(axis=0)
     for joint in range(len(chain.skeleton)):
         use = known[told[:, joint]] if some[joint] else known
-        local[:, joint] = _turned(solved.local[joint][:, use].T, use, frames)
+        turns, (before, after, part) = solved.local[joint][:, use].T, _around(use, frames)
+        local[:, joint] = quaternion.slerp(turns[before], turns[after], part)
     return poses(chain, root, local), some
 
 
@@ -78,18 +74,6 @@ def _around(known: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarr
     before = np.maximum(after - 1, 0)
     span = np.maximum(known[after] - known[before], 1)
     return before, after, np.clip((frames - known[before]) / span, 0.0, 1.0)
-
-
-def _slid(places: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Places (K, 3) between those of the known frames: (N, 3)."""
-    before, after, part = _around(known, frames)
-    return places[before] + part[:, None] * (places[after] - places[before])
-
-
-def _turned(turns: np.ndarray, known: np.ndarray, frames: np.ndarray) -> np.ndarray:
-    """Rotations (K, 4) between those of the known frames: (N, 4)."""
-    before, after, part = _around(known, frames)
-    return quaternion.slerp(turns[before], turns[after], part)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +131,7 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
     """
     began = time.perf_counter()
     seen = _positions(model, trial)
-    solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=_usual(model),
+    solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,
                        progress=progress, cancelled=cancelled)
     solving.run()
     return solving.result(time.perf_counter() - began)
@@ -161,21 +145,13 @@ def _chain(model, limited: bool) -> Chain:
     return made if limited else made.without_limits()
 
 
-def _usual(model) -> np.ndarray | None:
-    """sigma_s of every marker where the model knows it."""
-    known = getattr(model, "edge_sigma", None)
-    return None if known is None or np.shape(known) != np.shape(model.joint) else np.asarray(known, dtype=float)
-
-
 def _positions(model, trial) -> np.ndarray:
     """The model's markers as seen: (T, M, 3) m, NaN where the trial does not have them."""
     out = seen_markers(model, trial)
     seen = int(np.isfinite(out).any(axis=(0, 2)).sum())
     if seen < _FEWEST:
-        raise InputError(
-            trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
-            "choose the model or marker set of this recording",
-        )
+        raise InputError(trial.name, f"{seen} of the model's {len(model.markers)} markers", f"at least {_FEWEST}",
+                         "choose the model or marker set of this recording")
     return out
 
 
@@ -186,7 +162,9 @@ class _Solving:
         self.chain, self.settings, self.fps = chain, settings, fps
         self.positions = seen
         self.there = np.isfinite(seen).all(axis=-1)
-        self.weights = self._weights(usual)
+        self.weights = self.there.astype(float)
+        if settings.weights:
+            self.weights = marker_weights(chain.joint, chain.places, seen, usual)
         self.seen = np.ascontiguousarray(np.where(self.there[..., None], seen, 0.0).transpose(1, 2, 0))
         self.progress, self.cancelled = progress or (lambda part, text: None), cancelled or (lambda: False)
         count = len(chain.skeleton)
@@ -201,11 +179,6 @@ class _Solving:
         self.work_done, self.work = 0, 1
         self.alone = 0.5 if settings.smoothness > 0.0 else 1.0  # share of the work before all frames are smoothed
 
-    def _weights(self, usual) -> np.ndarray:
-        if not self.settings.weights:
-            return self.there.astype(float)
-        return marker_weights.weights(self.chain.joint, self.chain.places, self.positions, usual)
-
     def run(self) -> None:
         """Solve the frames that show enough, fill in the others."""
         ever = self.there.any(axis=0).sum()
@@ -215,7 +188,9 @@ class _Solving:
         spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
         coarse = np.unique(np.append(known[::spacing], known[-1]))
         self.work = len(known)
-        self._solve(coarse, self._first(coarse))
+        start = first_poses(self.chain, self.seen[..., coarse], self.weights[coarse].T)
+        for part in self._chunks(coarse):
+            self._keep(coarse[part], descend(self._task(coarse[part]), start.frames(part)))
         for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
             doubtful = self._doubtful(frames, source)
             self._better_from(source[doubtful], frames[doubtful])
@@ -291,15 +266,6 @@ class _Solving:
             self.progress(self.alone * min(self.work_done / self.work, 1.0), "solving poses")
             yield slice(first, first + _CHUNK)
             self.work_done += min(_CHUNK, len(frames) - first)
-
-    def _first(self, frames: np.ndarray) -> Poses:
-        """Poses from each frame's own markers."""
-        return first_poses(self.chain, self.seen[..., frames], self.weights[frames].T)
-
-    def _solve(self, frames: np.ndarray, start: Poses) -> None:
-        """Solve these frames from there, and keep what comes out."""
-        for part in self._chunks(frames):
-            self._keep(frames[part], descend(self._task(frames[part]), start.frames(part)))
 
     def _keep(self, frames: np.ndarray, arrived) -> None:
         self.poses.put(frames, arrived.poses)

@@ -13,14 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from . import limits
-from .chain import Chain, Poses, logarithm, marker_derivative, moved, multiply
+from .chain import CONJUGATE, Chain, Poses, logarithm, marker_derivative, moved, multiply
 from .descent import State, Task, carried_to_turns, crosswise, distance, state_of, wishes
 
 ARM = 0.1  # metres: a turn counts as much as a marker so far from the joint moves by it
 _KEPT, _AHEAD, _GIVEN = 240, 60, 2  # frames of a window, of its outlook, and of what was solved before it
 _MOST_STEPS = 8
 _STILL = 1e-4  # radians and metres
-_BACK = np.array([1.0, -1.0, -1.0, -1.0])[:, None]
 
 
 def smooth(task: Task, start: Poses, seconds: float, fps: float, watch=lambda part: None) -> tuple[Poses, np.ndarray]:
@@ -65,7 +64,7 @@ def _window(task: Task, at: Poses, strength: float, given: int) -> tuple[Poses, 
 
 def _rates(chain: Chain, at: Poses) -> np.ndarray:
     """What joints turn (rows 1 and on, rad) and the root moves (row 0, m) from frame to frame: (1 + J, 3, F - 1)."""
-    turns = logarithm(multiply(at.local[..., 1:], at.local[..., :-1] * _BACK))
+    turns = logarithm(multiply(at.local[..., 1:], at.local[..., :-1] * CONJUGATE))
     for joint in chain.hinges:
         turns[joint] = np.diff(at.angles[joint], axis=-1)
     return np.concatenate([np.diff(at.root, axis=-1)[None], turns])
@@ -141,11 +140,9 @@ def _columns(task: Task, best: State) -> tuple[np.ndarray, np.ndarray, np.ndarra
     across = point.weight * crosswise(far, point.radius)
     row = np.einsum("af,fac->fc", along, exact[:, count])
     rest = exact[:, count] - along.T[:, :, None] * row[:, None]
-    return (
-        np.concatenate([columns, row[:, None], rest], axis=1),
-        np.concatenate([away, far[:, None], np.zeros((frames, 3))], axis=1),
-        np.concatenate([weight, point.weight[:, None], np.repeat(across[:, None], 3, axis=1)], axis=1),
-    )
+    return (np.concatenate([columns, row[:, None], rest], axis=1),
+            np.concatenate([away, far[:, None], np.zeros((frames, 3))], axis=1),
+            np.concatenate([weight, point.weight[:, None], np.repeat(across[:, None], 3, axis=1)], axis=1))
 
 
 def _banded(blocks: np.ndarray, right: np.ndarray, strength: np.ndarray, given: int) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...motion import quaternion
-from .chain import Chain, Poses, angles_of, matrices, multiply, within
+from .chain import CONJUGATE, Chain, Poses, angles_of, matrices, multiply, within
 
 _BEYOND = 0.01  # how much the next joint's markers count beside a joint's own; those behind it this much less again
 _FAITH = 4e-4  # m2: how much the parent's direction counts, for what markers leave open
@@ -40,7 +40,7 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
         share = weights[near] * _BEYOND ** distance[joint][near][:, None]
         arms = rest[near] - chain.skeleton.rest_positions[joint]
         world.append(_about(arms, seen[near] - joints[joint], share, before))
-        local[joint] = multiply(world[parent] * np.array([1.0, -1.0, -1.0, -1.0])[:, None], world[joint])
+        local[joint] = multiply(world[parent] * CONJUGATE, world[joint])
         if not chain.turning[joint]:
             angles[joint] = within(chain, joint, angles_of(chain, joint, local[joint]))
             local[joint] = quaternion.from_euler(angles[joint].T, chain.order[joint]).T

@@ -20,8 +20,7 @@ import numpy as np
 from ...ball.physics import Ball, in_air
 from ...base.time_series import interpolate
 
-FASTEST_SPIN = 2.0 * np.pi * 50.0
-"""rad/s: 3000 turns a minute, the most that pitched baseballs have."""
+FASTEST_SPIN = 2.0 * np.pi * 50.0  # rad/s: 3000 turns a minute, the most that pitched baseballs have
 _RATES = 60
 _LEAST = 2  # frames of flight
 _FIRST = 0.11  # s of flight with which release and spin are searched; the rest follows from there
@@ -54,9 +53,8 @@ class LaunchFit:
 
     time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
     told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
-    no ball is smaller. residual: m, root mean square of the marker in flight.
-    time_sigma: s and speed_sigma: m/s, one standard deviation each. frames: of flight that were seen. seconds: of
-    flight that were used.
+    no ball is smaller. residual: m, root mean square of the marker in flight. time_sigma: s and speed_sigma: m/s, one
+    standard deviation each. frames: of flight that were seen. seconds: of flight that were used.
     """
 
     time: float
@@ -72,9 +70,8 @@ class LaunchFit:
     seconds: float
 
 
-def fit_launch(
-    marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float, window: float = 0.12
-) -> LaunchFit | None:
+def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: Ball, radius: float,
+               window: float = 0.12) -> LaunchFit | None:
     """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
 
     guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in
@@ -187,7 +184,7 @@ class _Search:
         it meets; and its release time."""
         end = t0 + seconds
         for turn in range(4):
-            self.air = self._air_of(flight, t0)
+            self.air = _air(self.times, t0, flight.velocity, self._turning(flight, t0)[0], self.ball)
             rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
             flight = self.flight(t0, end, rates) or flight
             width = max(width / 5.0, 0.05)
@@ -195,10 +192,6 @@ class _Search:
             tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
             flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
         return flight, t0
-
-    def _air_of(self, flight: _Flight, t0: float) -> np.ndarray:
-        spin, _, _ = self._turning(flight, t0)
-        return _air(self.times, t0, flight.velocity, spin, self.ball)
 
     def _turning(self, flight: _Flight, t0: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Spin (3,) rad/s, offset (3,) m of the marker from the centre, and the centre (3,) m, at the release.

@@ -21,20 +21,13 @@ from ...motion.hand import Hand, hand_of, usual_centre
 from ...motion.humanoid import identify
 from ...motion.motion import Motion, forward_kinematics, resample
 from ...motion.track.ball_path import BallPath
-from ..frame_times import evenly
-from ..trial import MarkerTrial
-from .carry import carried_and_thrown
-from .first_guess import by_distance, fastest, speeds
-from .hand_ball import HandBall, ball_in_hand
-from .hand_markers import sharpened
+from ..trial import MarkerTrial, evenly
 from .launch_fit import Held, fit_launch
-from .radar import radar_speed
+from .throwing_hand import HandBall, ball_in_hand, by_distance, fastest, place_ball, sharpened, speeds, steady_speeds
 from .without_ball import HOLD, release_by_hand
 
-FEWEST = 12
-"""Frames without which no throw is looked for."""
-SLOWEST = 1.5
-"""m/s: a hand that is never faster throws nothing."""
+FEWEST = 12  # frames without which no throw is looked for
+SLOWEST = 1.5  # m/s: a hand that is never faster throws nothing
 _BALL_LABEL = re.compile(r"^(base|tennis|hand|foot|soft)?[ _-]?ball[ _-]?\d*$", re.I)
 _HELD = (0.15, 0.015)  # s before the first guess: the marker stands still in the hand
 _NEARBY = 0.3  # s before a hand is fastest: the ball is in it
@@ -44,6 +37,14 @@ _REACHES = 0.35  # m from the palm, within which a marker may be on a ball that 
 _BESIDE = 1.5  # m, between the middle of the markers and that of the joints
 _LONGEST = 8.0  # s of flight until the ground
 _SURE, _UNSURE = 0.006, 0.05  # m, where the marker leaves: held and seen, or never seen in the hand
+
+MPH, KMH = 0.44704, 1.0 / 3.6
+SLOWEST_THROW, FASTEST_THROW = 2.0, 55.0  # m/s: what a ball out of a hand can have; a number outside is something else
+
+# pitcher_session_height(in)_weight(lb)_number_kind_speed(tenths of mph), as in the OpenBiomechanics Project
+_PITCH = re.compile(r"^\d{5,6}_\d{5,6}_\d{2,3}_\d{2,3}_\d{1,3}_[A-Za-z]{2}_(\d{3,4})$")
+_WITH_UNIT = re.compile(r"(?<![\d.])(\d{1,3}(?:[.,p]\d{1,2})?)[ _-]?(mph|kmh|kph|km[_-]h|mps|m[_-]s)(?![a-z])", re.I)
+_UNITS = {"mph": MPH, "kmh": KMH, "kph": KMH, "km_h": KMH, "mps": 1.0, "m_s": 1.0}
 
 
 @dataclass(frozen=True)
@@ -108,17 +109,16 @@ class Release:
 
     def report(self) -> dict:
         """The figures, for JSON."""
-        return {
-            "release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
-            "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
-            "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
-            "radar_speed_m_s": self.radar,
-            "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
-            "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side, "how": self.how,
-            "residual_m": None if np.isnan(self.residual) else self.residual, "flight_frames": self.flight_frames,
-            "impact_m": None if self.impact is None else self.impact.tolist(), "hips_m": self.hips.tolist(),
-            "ball_radius_m": self.radius, "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes),
-        }  # fmt: skip
+        return {"release_time_s": self.time, "release_frame": self.frame, "speed_m_s": self.speed,
+                "direction": self.direction.tolist(), "uncertainty_s": self.time_sigma,
+                "uncertainty_m_s": self.speed_sigma, "uncertainty_deg": float(np.degrees(self.way_sigma)),
+                "radar_speed_m_s": self.radar,
+                "against_radar": None if self.radar is None else self.speed / self.radar - 1.0,
+                "position_m": self.position.tolist(), "spin_rad_s": self.spin.tolist(), "hand": self.side,
+                "how": self.how, "residual_m": None if np.isnan(self.residual) else self.residual,
+                "flight_frames": self.flight_frames, "impact_m": None if self.impact is None else self.impact.tolist(),
+                "hips_m": self.hips.tolist(), "ball_radius_m": self.radius,
+                "ball_centre_in_hand_m": self.centre.tolist(), "warnings": list(self.notes)}
 
 
 def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = ReleaseSettings()) -> Release:
@@ -138,7 +138,8 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     label = _ball_label(even, settings.ball_marker)
     marker = None if label is None else even.positions[:, even.index(label)]
     sides = (settings.hand,) if settings.hand else ("left", "right")
-    hands = [sharpened(hand_of(motion, side), even, _ball_labels(even, label)) for side in sides]
+    balls = tuple(name for name in even.labels if name == label or _BALL_LABEL.match(name))
+    hands = [sharpened(hand_of(motion, side), even, balls) for side in sides]
     hand = _throwing(hands, marker)
     _check_throws(hand, even.name)
     lies, notes = _in_hand(hand, marker, settings, ball)
@@ -174,11 +175,10 @@ def _believed(found: _Found | None, hand: Hand, marker, label, radius, settings:
 
 def _check_throws(hand: Hand, name: str) -> None:
     """InputError where the hand is never fast enough to throw."""
-    pace = float(np.max(_steady(hand)))
+    pace = float(np.max(steady_speeds(hand.origin, hand.fps)))
     if pace < SLOWEST:
-        raise InputError(
-            name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw", "choose another trial, or the other hand"
-        )
+        raise InputError(name, f"a {hand.side} hand of at most {pace:.1f} m/s", "a throw",
+                         "choose another trial, or the other hand")
 
 
 def _check_near(trial: MarkerTrial, motion: Motion) -> None:
@@ -190,10 +190,8 @@ def _check_near(trial: MarkerTrial, motion: Motion) -> None:
         return
     away = np.linalg.norm(np.nanmedian(markers, axis=(0, 1)) - np.median(places, axis=(0, 1)))
     if away > _BESIDE:
-        raise InputError(
-            trial.name, f"markers {away:.1f} m beside the motion", "the motion that was made from this trial",
-            "reconstruct the trial first",
-        )  # fmt: skip
+        raise InputError(trial.name, f"markers {away:.1f} m beside the motion",
+                         "the motion that was made from this trial", "reconstruct the trial first")
 
 
 def _away(hand: Hand, marker: np.ndarray, found: _Found | None) -> float:
@@ -228,7 +226,7 @@ def _result(found: _Found, hand: Hand, motion: Motion, lies: HandBall, seen, nam
     launch = replace(found.launch, position=found.launch.position - hand.shift)
     home = replace(hand, origin=hand.origin - hand.shift)
     ground = ground_height(motion)
-    places = carried_and_thrown(home, lies.centre, launch, found.ball, ground)
+    places = place_ball(home, lies.centre, launch, found.ball, ground)
     way = fly(launch, found.ball, _LONGEST, ground)
     impact = way.at(way.bounces[:1])[0] - [0.0, 0.0, found.ball.radius] if len(way.bounces) else None
     hips = forward_kinematics(motion.frames(0, 1))[0][0, identify(motion.skeleton).hips]
@@ -246,16 +244,12 @@ def _frame_for_frame(trial: MarkerTrial, motion: Motion) -> Motion:
     if abs(motion.fps - trial.fps) > 0.01 * trial.fps:
         other = resample(motion, trial.fps)
         if abs(len(other) - len(trial)) <= max(2.0 * trial.fps / motion.fps, 2.0):
-            return _as_long(other, len(trial))
+            at = np.minimum(np.arange(len(trial)), len(other) - 1)
+            return Motion(other.skeleton, other.root_positions[at], other.rotations[at], other.fps)
     raise InputError(
         trial.name, f"{len(trial)} frames at {trial.fps:g} per second, and a motion of {len(motion)} at {motion.fps:g}",
         "the motion that was made from this trial", "reconstruct the trial first",
     )  # fmt: skip
-
-
-def _as_long(motion: Motion, count: int) -> Motion:
-    at = np.minimum(np.arange(count), len(motion) - 1)
-    return Motion(motion.skeleton, motion.root_positions[at], motion.rotations[at], motion.fps)
 
 
 def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
@@ -269,10 +263,6 @@ def _ball_label(trial: MarkerTrial, asked: str | None) -> str | None:
     return max(named, key=lambda label: np.count_nonzero(trial.seen[:, trial.index(label)]))
 
 
-def _ball_labels(trial: MarkerTrial, label: str | None) -> tuple[str, ...]:
-    return tuple(name for name in trial.labels if name == label or _BALL_LABEL.match(name))
-
-
 def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
     """The hand in which the ball's marker is before it flies; without a marker the faster one."""
     peaks = [fastest(hand.origin, hand.fps) for hand in hands]
@@ -281,13 +271,6 @@ def _throwing(hands: list[Hand], marker: np.ndarray | None) -> Hand:
         return hands[fast]
     nearest = [_distance(hand, marker, peaks[fast]) for hand in hands]
     return hands[int(np.argmin(nearest))] if min(nearest) < 2.0 * _REACHES else hands[fast]
-
-
-def _steady(hand: Hand) -> np.ndarray:
-    """(T,) m/s, of which single frames that are off are taken out."""
-    from scipy.signal import medfilt
-
-    return medfilt(speeds(hand.origin, hand.fps), 5)
 
 
 def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
@@ -300,7 +283,9 @@ def _distance(hand: Hand, marker: np.ndarray, peak: int) -> float:
 
 def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple[HandBall, list[str]]:
     """Where the ball lies in the hand, and what is to be told of it."""
-    usual = usual_centre(hand.finger, hand.reach, _palm(hand))
+    # out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise
+    palm = np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
+    usual = usual_centre(hand.finger, hand.reach, palm)
     radius = settings.radius or ball.radius
     if settings.centre is not None:
         return HandBall(np.array(settings.centre, float), radius, 0.005), []
@@ -310,11 +295,6 @@ def _in_hand(hand: Hand, marker, settings: ReleaseSettings, ball: Ball) -> tuple
     lies = ball_in_hand(hand.taken_back(marker)[held], radius, usual, fit_radius=settings.radius is None)
     told = [f"the ball's radius is {1000.0 * lies.radius:.0f} mm by its marker"] if lies.fitted else []
     return lies, told
-
-
-def _palm(hand: Hand) -> np.ndarray | None:
-    """Out of the palm, at rest: downwards for arms that are spread at rest, unknown otherwise."""
-    return np.array([0.0, 0.0, -1.0]) if abs(hand.finger[1]) > 0.9 else None
 
 
 def _held_frames(hand: Hand, marker: np.ndarray) -> np.ndarray:
@@ -339,10 +319,11 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     velocity = np.gradient(centre, 1.0 / hand.fps, axis=0)
     course = Held(hand.carried(place), centre, velocity, _SURE if sure else _UNSURE)
     guess = _guess(hand, marker)
-    fits = [(fit_launch(
-        marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius, window=settings.window,
-    ), air)
-            for air in (ball, _without_air(ball))]
+    # without air as eq. 6.2 has it; which of both is nearer to what was seen is taken
+    without_air = replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
+    fits = [(fit_launch(marker, course, hand.fps, guess=guess, ball=air, radius=lies.radius,
+                        window=settings.window), air)
+            for air in (ball, without_air)]
     if fits[0][0] is None or fits[1][0] is None:
         return None
     fit, ball = min(fits, key=lambda found: (-round(found[0].seconds, 3), found[0].residual))
@@ -354,11 +335,6 @@ def _by_ball(hand: Hand, marker, lies: HandBall, ball: Ball, settings: ReleaseSe
     way_sigma = speed_sigma / max(float(np.linalg.norm(fit.velocity)), 1e-9)
     return _Found(launch=launch, ball=ball, how="ball", time_sigma=fit.time_sigma, speed_sigma=speed_sigma,
                   way_sigma=way_sigma, residual=fit.residual, frames=fit.frames, circle=fit.circle)
-
-
-def _without_air(ball: Ball) -> Ball:
-    """As eq. 6.2 has it; which of both is nearer to what was seen is taken."""
-    return replace(ball, drag=0.0, lift=(0.0, *ball.lift[1:]))
 
 
 def _by_hand(hand: Hand, motion: Motion, lies: HandBall, ball: Ball, notes) -> _Found:
@@ -375,3 +351,21 @@ def _stride(motion: Motion) -> np.ndarray:
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
     return places[:, body.left.foot, :2] - places[:, body.right.foot, :2]
+
+
+def radar_speed(name: str) -> float | None:
+    """m/s out of a file's name without its ending, or None where it tells no speed for certain.
+
+    `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` say it with a
+    unit. Two different speeds in one name are none.
+    """
+    pitch = _PITCH.match(name)
+    if pitch:
+        return _possible_speed(int(pitch[1]) / 10.0 * MPH)
+    told = {round(float(re.sub("[,p]", ".", number.lower())) * _UNITS[unit.lower().replace("-", "_")], 6) for number,
+            unit in _WITH_UNIT.findall(name)}
+    return _possible_speed(told.pop()) if len(told) == 1 else None
+
+
+def _possible_speed(speed: float) -> float | None:
+    return speed if SLOWEST_THROW <= speed <= FASTEST_THROW else None

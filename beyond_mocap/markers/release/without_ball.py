@@ -26,16 +26,12 @@ import numpy as np
 
 from ...base.time_series import interpolate
 from ...motion.hand import Hand
-from .first_guess import fastest
+from .throwing_hand import fastest
 
-SPEED_SIGMA = 0.06
-"""Of the speed, one standard deviation."""
-TIME_SIGMA = 0.004
-"""Seconds, one standard deviation, in a fast throw; slower ones have more, as they roll longer."""
-PAD = 0.91
-"""Of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees."""
-HOLD = 0.70
-"""Of the way from wrist to fingertip: where the ball's centre is while it is gripped."""
+SPEED_SIGMA = 0.06  # of the speed, one standard deviation
+TIME_SIGMA = 0.004  # seconds, one standard deviation, in a fast throw; slower ones have more, as they roll longer
+PAD = 0.91  # of the way from wrist to fingertip: where the fingers' pads push, each joint bent by some 25 degrees
+HOLD = 0.70  # of the way from wrist to fingertip: where the ball's centre is while it is gripped
 ROLLS_WITH = 2.0 / 7.0  # share of a surface's speed that a solid ball rolling on it takes on
 _SMOOTH = 0.014  # s, the window of the parabolas that velocities are taken from
 _NEAR = 0.1  # s about the frame in which the wrist is fastest when single frames are left aside

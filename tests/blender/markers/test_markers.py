@@ -237,7 +237,7 @@ def test_markers_without_names_go_to_the_side_they_are_near_to(core, tmp_path):
     )
     path = tmp_path / "run.trc"
     lost = known.trial.renamed({"LHAND": "x53", "RHAND": "x52"})  # the set's own aliases have them the other way round
-    core("markers.files.trc_write").write_trc(lost, path)
+    core("markers.files.trc").write_trc(lost, path)
     thing = imported(path)
     assert tuple(row.name for row in thing.beyond_mocap_cloud.labels) == known.trial.labels
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.markers.files.marker_set_text import chosen_set
-from beyond_mocap.markers.floor import OVER_SOLE, floor_under
 from beyond_mocap.markers.model.assemble import model_from_frame
+from beyond_mocap.markers.pose.residuals import OVER_SOLE, floor_under
 from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.synthetic.ground_truth.planted_markers import planted
 

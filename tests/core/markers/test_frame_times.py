@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.frame_times import evenly, frame_times
-from beyond_mocap.markers.trial import MarkerTrial
+from beyond_mocap.markers.trial import MarkerTrial, evenly, frame_times
 
 LABELS = tuple(f"M{i}" for i in range(12))
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.model.marker_set import MarkerSet
-from beyond_mocap.markers.naming import named_as
+from beyond_mocap.markers.model.marker_set import MarkerSet, named_as
 from beyond_mocap.markers.trial import MarkerTrial
 
 SET = MarkerSet(

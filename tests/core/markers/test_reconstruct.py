@@ -9,7 +9,7 @@ import pytest
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.markers.files.trc_write import write_trc
+from beyond_mocap.markers.files.trc import write_trc
 from beyond_mocap.markers.model.model import BallMarker
 from beyond_mocap.markers.reconstruct import ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import forward_kinematics

@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.report.impacts import aligned_impacts, dominant_sides, kept
-from beyond_mocap.markers.report.page import trials_report
-from beyond_mocap.markers.report.paired import paired
-from beyond_mocap.markers.report.results import Throw, TrialResult, read_results
+from beyond_mocap.markers.trial_results import (
+    Throw,
+    TrialResult,
+    aligned_impacts,
+    compare_speeds,
+    dominant_sides,
+    near_mean,
+    read_results,
+)
+from beyond_mocap.markers.trials_page import trials_report
 
 pytest.importorskip("matplotlib")
 
@@ -104,7 +110,7 @@ def test_impacts_are_aligned_to_each_subjects_throws():
 
 def test_far_throws_are_culled():
     points = np.concatenate([np.random.default_rng(0).normal(0.0, 1.0, (40, 2)), [[30.0, 0.0], [np.nan, 0.0]]])
-    assert kept(points)[:40].all() and not kept(points)[40:].any()
+    assert near_mean(points)[:40].all() and not near_mean(points)[40:].any()
 
 
 def test_the_dominant_arm_is_the_one_that_throws_more():
@@ -115,13 +121,13 @@ def test_the_dominant_arm_is_the_one_that_throws_more():
 def test_planted_differences_are_told():
     rng = np.random.default_rng(7)
     measured = rng.uniform(10.0, 30.0, 60)
-    slow = paired(measured - 1.152 + rng.normal(0.0, 1.685, 60), measured)
+    slow = compare_speeds(measured - 1.152 + rng.normal(0.0, 1.685, 60), measured)
     assert slow.count == 60 and slow.wilcoxon < 0.01 and slow.normal > 0.01
     assert abs(slow.mean + 1.152) < 0.7 and abs(slow.sd - 1.685) < 0.5
     noise = rng.normal(0.0, 1.0, 60)
-    fair = paired(measured + noise - np.median(noise), measured)
+    fair = compare_speeds(measured + noise - np.median(noise), measured)
     assert fair.wilcoxon > 0.05
-    few = paired([20.0, np.nan, 21.0], [20.0, 20.0, 20.0])
+    few = compare_speeds([20.0, np.nan, 21.0], [20.0, 20.0, 20.0])
     assert few.count == 2 and np.isnan(few.wilcoxon) and few.within == 1.0
-    assert paired([20.0] * 8, [20.0] * 8).count == 8
-    assert paired([], []).count == 0
+    assert compare_speeds([20.0] * 8, [20.0] * 8).count == 8
+    assert compare_speeds([], []).count == 0

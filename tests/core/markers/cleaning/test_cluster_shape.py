@@ -4,8 +4,7 @@ tell bodies apart."""
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.cleaning.cluster_shape import distance_spread, mean_shape
-from beyond_mocap.markers.cleaning.robust import median, medians, quantile
+from beyond_mocap.markers.cleaning.cluster_shape import distance_spread, mean_shape, median, medians, quantile
 from beyond_mocap.motion import quaternion
 
 CLUSTER = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.02], [0.03, 0.12, 0.0], [-0.05, 0.02, 0.09]])

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.files.marker_files import read_markers
-from beyond_mocap.markers.files.trc_write import trc_text, write_trc
+from beyond_mocap.markers.files.trc import trc_text, write_trc
 from beyond_mocap.markers.trial import MarkerTrial
 
 

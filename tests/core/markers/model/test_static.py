@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.model.static import static_frame, stillest
+from beyond_mocap.markers.model.assemble import static_frame, stillest
 from beyond_mocap.markers.trial import MarkerTrial
 from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.gait import gait

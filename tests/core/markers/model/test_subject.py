@@ -7,8 +7,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.markers.files.marker_set_text import chosen_set
-from beyond_mocap.markers.model.assemble import model_from_frame
-from beyond_mocap.markers.model.subject import subject_models
+from beyond_mocap.markers.model.assemble import model_from_frame, subject_models
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import gait

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.markers.pose.butterworth import butterworth, low_pass
+from beyond_mocap.markers.pose.low_pass import butterworth, low_pass
 from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.gait import gait
 

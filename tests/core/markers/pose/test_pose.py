@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.markers.model.joint_freedom import freedom_of
-from beyond_mocap.markers.model.model import MarkerModel
+from beyond_mocap.markers.model.model import MarkerModel, freedom_of
 from beyond_mocap.markers.pose import pose
 from beyond_mocap.markers.pose.pose import HeldBall, PoseSettings, solve
 from beyond_mocap.motion import quaternion

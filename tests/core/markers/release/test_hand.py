@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.markers.pose.butterworth import butterworth
-from beyond_mocap.markers.release.hand_markers import sharpened
+from beyond_mocap.markers.pose.low_pass import butterworth
+from beyond_mocap.markers.release.throwing_hand import sharpened
 from beyond_mocap.markers.release.without_ball import release_by_hand
 from beyond_mocap.motion.hand import hand_of
 from beyond_mocap.motion.motion import Motion

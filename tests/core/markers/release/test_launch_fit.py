@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.markers.release.first_guess import by_distance, fastest
-from beyond_mocap.markers.release.hand_ball import ball_in_hand
 from beyond_mocap.markers.release.launch_fit import Held, fit_launch
+from beyond_mocap.markers.release.throwing_hand import ball_in_hand, by_distance, fastest
 from beyond_mocap.motion import quaternion
 
 RADIUS, RELEASE = 0.0366, 0.5037

@@ -2,7 +2,7 @@
 
 import pytest
 
-from beyond_mocap.markers.release.radar import radar_speed
+from beyond_mocap.markers.release.release import radar_speed
 
 
 @pytest.mark.parametrize("name, speed", [

@@ -10,7 +10,7 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.markers.files.trc_write import write_trc
+from beyond_mocap.markers.files.trc import write_trc
 from beyond_mocap.markers.release.release import ReleaseSettings, release
 from beyond_mocap.motion.motion import concatenate, resample
 from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall

@@ -1,23 +1,110 @@
-"""The pictures of a folder of trials, each a PNG as bytes (Fredriksson figs. 8.1 to 8.4); matplotlib inside functions.
+"""The report over a folder of trials as one page for a browser (Fredriksson §8.1-8.2): how well markers fit and how
+long it took, where throws land, how fast they are beside a speed gun. It loads nothing, and all names are escaped.
+
+    page = trials_report(folder)
+
+`folder` is what `beyond-mocap reconstruct FOLDER --out OUT` wrote. Pictures are PNGs as bytes; matplotlib is imported
+inside functions.
 """
 
 from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
-from ...evaluation.plots import plain
-from .impacts import dominant_sides
-from .results import TrialResult
+from ..evaluation import html_page as html
+from ..evaluation.plots import plain
+from .trial_results import LEAST, TrialResult, aligned_impacts, compare_speeds, dominant_sides, near_mean, read_results
 
 DOMINANT, OTHER, QUIET = "#2563a8", "#e08a00", "#999999"
 _WIDTH, _DPI = 11.0, 100
 _BINS = 24
 
 
-def residuals_and_time(results: Sequence[TrialResult]) -> bytes:
+def trials_report(folder: Path) -> str:
+    """The page, as text: how well markers fit and how long it took, where throws land, how fast they are.
+
+    InputError where the folder holds no reports, or matplotlib is not installed.
+    """
+    results = read_results(Path(folder))
+    made = [result for result in results if not result.error]
+    title = Path(folder).resolve().name
+    parts = [html.element("h1", f"{title}: {len(results)} trials")]
+    if made:
+        parts.append(_section("Markers and time", _fit_text(made), draw_residuals_and_time(results),
+                              draw_residuals_by_trial(results)))
+    return html.build_page(title, *parts, *_throws(made), html.build_section("All trials", _table(results)))
+
+
+def _fit_text(made: Sequence[TrialResult]) -> html.Html:
+    residual, single = (_mean([getattr(r, name) for r in made]) for name in ("residual", "single"))
+    rate = _mean([r.rate for r in made])
+    said = f"Residuals {residual:.1f} mm (segments alone {single:.1f} mm), {rate:.0f} frames a second on the whole."
+    return html.element("p", f"{said} Bars end one standard deviation up and down.")
+
+
+def _throws(made: Sequence[TrialResult]) -> list[html.Html]:
+    """What there is to say of throws; nothing where none was found."""
+    thrown = [result for result in made if result.throw is not None]
+    if not thrown:
+        return []
+    parts = []
+    points = aligned_impacts(thrown)
+    near = near_mean(points)
+    if near.any():
+        said = f"{int(near.sum())} of {len(thrown)} throws; those beyond three standard deviations are left out."
+        parts.append(_section("Where throws land", html.element("p", said), draw_impact_map(points[near]),
+                              draw_impact_scatter(thrown, points)))
+    pairs = [(r.throw.radar, r.throw.speed) for r in thrown if r.throw.radar]
+    if pairs:
+        measured, estimated = np.array(pairs, float).T
+        parts.append(_section("How fast they are", _speed_text(estimated, measured), draw_speeds(measured, estimated)))
+    return parts
+
+
+def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
+    found = compare_speeds(estimated, measured)
+    many = "throws" if found.count != 1 else "throw"
+    lines = [f"{found.count} {many} with a measured speed: estimated - measured {found.mean:+.2f} m/s"
+             + (f" (standard deviation {found.sd:.2f})" if np.isfinite(found.sd) else "")
+             + f", {100 * found.share:.1f} % off on average, {100 * found.within:.0f} % of them within 10 %."]
+    if np.isfinite(found.normal):
+        lines.append(f"Normality of the differences (Shapiro-Wilk): p = {found.normal:.3f}.")
+    if np.isfinite(found.wilcoxon):
+        lines.append(f"No difference (Wilcoxon, compare_speeds, two-sided): p = {found.wilcoxon:.4f}.")
+    else:
+        lines.append(f"Too few or too equal for the paired test, which needs {LEAST} throws.")
+    return html.fragment(*(html.element("p", line) for line in lines))
+
+
+def _table(results: Sequence[TrialResult]) -> html.Html:
+    number = html.build_title
+    titles = ("trial", "subject", number("frames"), number("residual, mm"), number("frames/s"), "hand",
+              number("speed, m/s"), number("radar"), "")
+    return html.build_table(titles, map(_row, results))
+
+
+def _row(result: TrialResult) -> html.Html:
+    side, speed, radar = (result.throw.side, result.throw.speed, result.throw.radar) if result.throw else ("", None, 0)
+    cell = html.build_number_cell
+    return html.build_row(result.name, result.subject, cell(result.frames or None), cell(result.residual, 1),
+                          cell(result.rate), side, cell(speed, 1), cell(radar or None, 1),
+                          html.element("td", result.error, class_="missed"))
+
+
+def _section(title: str, body: html.Html, *images: bytes) -> html.Html:
+    return html.build_section(title, body, *(html.build_image(png, title) for png in images))
+
+
+def _mean(values: Sequence[float]) -> float:
+    known = [value for value in values if np.isfinite(value)]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def draw_residuals_and_time(results: Sequence[TrialResult]) -> bytes:
     """Fig. 8.1: weighted squared residuals a frame, and milliseconds a frame, by subject; bars end one standard
     deviation up and down."""
     made = [result for result in results if not result.error]
@@ -35,7 +122,7 @@ def residuals_and_time(results: Sequence[TrialResult]) -> bytes:
     return _png(figure)
 
 
-def residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
+def draw_residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
     """Root mean square residuals of every trial, beside what fitting each segment alone leaves."""
     made = [result for result in results if not result.error]
     figure, (ax,) = _canvas(1, 1, 0.9 + 0.28 * len(made))
@@ -50,7 +137,7 @@ def residuals_by_trial(results: Sequence[TrialResult]) -> bytes:
     return _png(figure)
 
 
-def impact_map(points: np.ndarray) -> bytes:
+def draw_impact_map(points: np.ndarray) -> bytes:
     """Fig. 8.2: how many throws land where, points (N, 2) m as `aligned_impacts` gives them, and their margins."""
     from matplotlib.figure import Figure
     from matplotlib.ticker import MaxNLocator
@@ -72,7 +159,7 @@ def impact_map(points: np.ndarray) -> bytes:
     return _png(figure)
 
 
-def impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
+def draw_impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
     """Fig. 8.3: where each subject's throws land, by dominant and other arm."""
     sides = dominant_sides(results)
     figure, axes = _canvas((len(sides) + 2) // 3, min(len(sides), 3), 3.6)
@@ -91,7 +178,7 @@ def impact_scatter(results: Sequence[TrialResult], points: np.ndarray) -> bytes:
     return _png(figure)
 
 
-def speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
+def draw_speeds(measured: np.ndarray, estimated: np.ndarray) -> bytes:
     """Fig. 8.4: how speeds (N,) m/s are spread, measured and estimated, and pair by pair."""
     figure, (left, right) = _canvas(1, 2, 3.8)
     edges = _edges(np.concatenate([measured, estimated]), 16)

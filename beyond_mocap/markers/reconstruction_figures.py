@@ -5,30 +5,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...motion import contacts as foot_contacts
-from ...motion.humanoid import identify
-from ...motion.motion import Motion, forward_kinematics
-from ...synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
-from ..pose.residuals import residuals
+from ..base.errors import InputError
+from ..motion import contacts as foot_contacts
+from ..motion.humanoid import identify
+from ..motion.motion import Motion, forward_kinematics
+from ..synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
+from .pose.residuals import residuals
 
 
 def figures(made) -> dict:
     """The report of a `reconstruct.Reconstruction`, for JSON; lengths of markers in millimetres, see the keys."""
     solved, motion = made.solved, made.motion
     posing = made.seconds.get("pose") or solved.seconds
-    return {
-        "trial": made.raw.name, "subject": made.model.subject, "marker_set": made.model.set_name,
-        "markers": len(made.model.markers), "joints": len(made.model.skeleton), "fps": motion.fps,
-        "frames": len(motion), "duration_s": motion.duration, "seconds": dict(made.seconds),
-        "residual_mm": residual_figures(made), "weighted_se": weighted_squares(solved),
-        "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": bones_change(motion),
-        "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor,
-        "grounded": made.grounded,
-        "held_share": None if made.held is None else float(made.held.any(axis=(1, 2)).mean()),
-        **made.cleaned.report.as_dict(), "release": None if made.release is None else made.release.report(),
-        "warnings": list(made.warnings),
-    }  # fmt: skip
+    return {"trial": made.raw.name, "subject": made.model.subject, "marker_set": made.model.set_name,
+            "markers": len(made.model.markers), "joints": len(made.model.skeleton), "fps": motion.fps,
+            "frames": len(motion), "duration_s": motion.duration, "seconds": dict(made.seconds),
+            "residual_mm": residual_figures(made), "weighted_se": weighted_squares(solved),
+            "frames_per_second": len(motion) / posing if posing else None, "bones_change_m": bones_change(motion),
+            "skate": skate(motion), "limits": limit_shares(solved, motion.skeleton.names), "floor_m": made.floor,
+            "grounded": made.grounded,
+            "held_share": None if made.held is None else float(made.held.any(axis=(1, 2)).mean()),
+            **made.cleaned.report.as_dict(), "release": None if made.release is None else made.release.report(),
+            "warnings": list(made.warnings)}
 
 
 def residual_figures(made) -> dict:
@@ -38,11 +36,9 @@ def residual_figures(made) -> dict:
     single = 1000.0 * made.solved.single[np.isfinite(made.solved.single)]
     written = 1000.0 * residuals(made.model, made.motion, made.trial)
     each = {label: _mean(1000.0 * made.solved.residual[:, i]) for i, label in enumerate(made.model.markers)}
-    return {
-        "mean": _mean(seen), "rms": _rms(seen), "p95": _percentile(seen, 95), "max": _percentile(seen, 100),
-        "single_mean": _mean(single), "single_rms": _rms(single), "output_mean": _mean(written),
-        "output_rms": _rms(written), "per_marker": each,
-    }  # fmt: skip
+    return {"mean": _mean(seen), "rms": _rms(seen), "p95": _percentile(seen, 95), "max": _percentile(seen, 100),
+            "single_mean": _mean(single), "single_rms": _rms(single), "output_mean": _mean(written),
+            "output_rms": _rms(written), "per_marker": each}
 
 
 def weighted_squares(solved) -> dict:
@@ -71,10 +67,8 @@ def skate(motion: Motion) -> dict | None:
     places, _ = forward_kinematics(motion)
     feet = places[:, foot_joints(motion.skeleton)]
     travel = 1000.0 * stance_travel(feet[:, :, 1], stances(standing))
-    return {
-        "contact_cm_s": _mean(100.0 * contact_speeds(feet, standing, motion.fps)),
-        "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel),
-    }  # fmt: skip
+    return {"contact_cm_s": _mean(100.0 * contact_speeds(feet, standing, motion.fps)),
+            "stance_mm_median": float(np.median(travel)) if len(travel) else None, "stances": len(travel)}
 
 
 def limit_shares(solved, names) -> dict[str, float]:

@@ -1,0 +1,183 @@
+"""The results of a folder of reconstructed trials, one row a trial, read from the reports that were written; where
+their throws land, and how fast these are beside a speed gun."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import InputError
+from ..base.vectors import unit_vector, unit_vectors
+from ..evaluation.report import check_depth
+
+CULLED = 3.0  # standard deviations from the mean, beyond which a throw is left out (Fredriksson §8.2)
+
+LEAST = 6  # pairs below which Wilcoxon's test cannot reject anything at 0.05 (two-sided: 2 / 2^n)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Throw:
+    """A release. speed, radar: m/s, radar None where the file's name had none. side: of the hand. hips: (2,) m at the
+    start, impact: (2,) m on the ground, None where the ball never came down. velocity: (3,) m/s. how: "ball" or "hand".
+    """
+
+    speed: float
+    radar: float | None
+    side: str
+    hips: np.ndarray
+    impact: np.ndarray | None
+    velocity: np.ndarray
+    how: str
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TrialResult:
+    """One trial. subject: as the file says, else its session, "" where unknown. frames: how many. squares: m^2,
+    weighted squared residuals a frame (mean and standard deviation; eq. 5.1). residual, single: mm, root mean square of
+    the model's markers and of single segments. rate: frames a second of the pose. throw: its release, or None. error:
+    why there is no motion, "" where there is."""
+
+    name: str
+    subject: str
+    frames: int = 0
+    squares: tuple[float, float] = (np.nan, np.nan)
+    residual: float = np.nan
+    single: float = np.nan
+    rate: float = np.nan
+    throw: Throw | None = None
+    error: str = ""
+
+
+def read_results(folder: Path) -> tuple[TrialResult, ...]:
+    """The trials of a folder by name: of its trials.json, else of all *.report.json below it. InputError where there
+    are none, or a report cannot be read."""
+    table = folder / "trials.json"
+    if table.is_file():
+        rows = _read(table).get("trials", ())
+        return tuple(_of_row(folder, row) for row in rows)
+    reports = sorted(folder.rglob("*.report.json"))
+    if not reports:
+        raise InputError(folder, "no reports of trials", "what 'reconstruct FOLDER --out' wrote", "check the folder")
+    return tuple(_of_report(path.name.removesuffix(".report.json"), _read(path)) for path in reports)
+
+
+def _of_row(folder: Path, row: Mapping) -> TrialResult:
+    name = str(row.get("trial", ""))
+    if row.get("error") or not row.get("report"):
+        return TrialResult(name=name, subject=str(row.get("subject") or ""), error=str(row.get("error") or "no motion"))
+    found = _of_report(name, _read(folder / row["report"]))
+    return found if found.subject else replace(found, subject=str(row.get("session") or ""))
+
+
+def _of_report(name: str, report: Mapping) -> TrialResult:
+    residual, squares = report.get("residual_mm") or {}, report.get("weighted_se") or {}
+    return TrialResult(name=name, subject=str(report.get("subject") or ""), frames=int(report.get("frames") or 0),
+                       squares=(_number(squares.get("mean")), _number(squares.get("sd"))),
+                       residual=_number(residual.get("rms", residual.get("mean"))),
+                       single=_number(residual.get("single_rms", residual.get("single_mean"))),
+                       rate=_number(report.get("frames_per_second")), throw=_throw(report.get("release")))  # fmt: skip
+
+
+def _throw(release: Mapping | None) -> Throw | None:
+    if not release or release.get("speed_m_s") is None:
+        return None
+    impact = release.get("impact_m")
+    speed = float(release["speed_m_s"])
+    return Throw(speed=speed, radar=release.get("radar_speed_m_s"), side=str(release.get("hand", "")),
+                 hips=np.array(release.get("hips_m", (0.0, 0.0, 0.0))[:2], float),
+                 impact=None if impact is None else np.array(impact[:2], float),
+                 velocity=speed * np.array(release.get("direction", (1.0, 0.0, 0.0)), float),
+                 how=str(release.get("how", "")))
+
+
+def _number(value) -> float:
+    return float("nan") if value is None else float(value)
+
+
+def _read(path: Path) -> Mapping:
+    try:
+        found = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(path, f"cannot be read: {error}", "a report in JSON", "reconstruct the folder again") from None
+    if not isinstance(found, Mapping):
+        raise InputError(path, "holds no object", "a report in JSON", "reconstruct the folder again")
+    check_depth(found, path)
+    return found
+
+
+def dominant_sides(results: Sequence[TrialResult]) -> dict[str, str]:
+    """Subject -> the hand that threw more often; ties go to the right."""
+    sides: dict[str, list[str]] = {}
+    for result in results:
+        if result.throw is not None:
+            sides.setdefault(result.subject, []).append(result.throw.side)
+    return {subject: "left" if thrown.count("left") > thrown.count("right") else "right"
+            for subject, thrown in sides.items()}
+
+
+def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
+    """(N, 2) m of the N results: where each throw meets the ground, NaN where it does not.
+
+    Axes as in fig. 8.2: origin at the hips in the trial's first frame, y along the direction of a subject's throws (the
+    mean of their level directions, for nobody knows the target), x to the right of it.
+    """
+    out = np.full((len(results), 2), np.nan)
+    for subject in {result.subject for result in results}:
+        rows = [i for i, result in enumerate(results)
+                if result.subject == subject and result.throw is not None and result.throw.impact is not None]
+        if not rows:
+            continue
+        ways = np.array([results[i].throw.velocity[:2] for i in rows])
+        mean = np.sum(unit_vectors(ways), axis=0)
+        along = unit_vector(mean)
+        across = np.array([along[1], -along[0]])
+        for i in rows:
+            way = results[i].throw.impact - results[i].throw.hips
+            out[i] = way @ across, way @ along
+    return out
+
+
+def near_mean(points: np.ndarray) -> np.ndarray:
+    """(N,) bool: the points (N, 2) within three standard deviations of their mean on both axes; NaN are not kept."""
+    known = np.isfinite(points).all(axis=-1)
+    if np.count_nonzero(known) < 3:
+        return known
+    mean, spread = points[known].mean(axis=0), points[known].std(axis=0)
+    return known & (np.abs(points - mean) <= CULLED * np.maximum(spread, 1e-9) + 1e-9).all(axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Paired:
+    """count: of pairs. mean, sd: m/s of estimated - measured. share: of the measured, mean of the absolute differences.
+    within: share of pairs that differ by at most 10 %. wilcoxon: two-sided p that the differences are about zero, and
+    normal: p of Shapiro and Wilk that they are normal; NaN where there are too few."""
+
+    count: int
+    mean: float
+    sd: float
+    share: float
+    within: float
+    wilcoxon: float
+    normal: float
+
+
+def compare_speeds(estimated: np.ndarray, measured: np.ndarray) -> Paired:
+    """The comparison of speeds (N,) m/s that belong together; pairs with NaN are left out."""
+    from scipy.stats import shapiro, wilcoxon
+
+    estimated, measured = np.asarray(estimated, float), np.asarray(measured, float)
+    known = np.isfinite(estimated) & np.isfinite(measured)
+    off, base = (estimated - measured)[known], measured[known]
+    if not len(off):
+        none = float("nan")
+        return Paired(count=0, mean=none, sd=none, share=none, within=none, wilcoxon=none, normal=none)
+    varies = len(off) > 1 and np.ptp(off) > 1e-12
+    share = np.abs(off) / base
+    return Paired(count=len(off), mean=float(off.mean()), sd=float(off.std(ddof=1)) if len(off) > 1 else np.nan,
+                  share=float(share.mean()), within=float(np.mean(share <= 0.1)),
+                  wilcoxon=float(wilcoxon(off).pvalue) if len(off) >= LEAST and np.any(off != 0.0) else np.nan,
+                  normal=float(shapiro(off).pvalue) if len(off) >= 3 and varies else np.nan)  # fmt: skip
