@@ -13,7 +13,7 @@ from ..beyond_mocap.base.settings.choices import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
 from ..scene.ball.settings import aimed, aimed_ball
 from ..scene.ball.subject import ball_meant, body_meant, stretch_of, target_meant
-from ..scene.core import channels, linked
+from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player
 from ..scene.passes import hits_shown, possession, tracked
@@ -63,7 +63,7 @@ from where it lies"""
         shots.unsure()
         ball, scene = ball_meant(context), context.scene
         if ball is not None and ball.beyond_mocap_aim.on:
-            linked.refuse(ball)
+            channels.check_local(ball)
             solved = shots.solve(scene, shots.wish_of(scene, ball), ball.name)
             shots.write(scene, ball, solved)
         else:
@@ -73,7 +73,7 @@ from where it lies"""
     def new(self, context, ball):
         """A ball that is not aimed yet."""
         body, scene, target = body_meant(context), context.scene, target_meant(context)
-        linked.refuse(ball, body)
+        channels.check_local(ball, body)
         shots.check_ball(ball)
         first, last = self.first, self.last
         if body is None:
@@ -244,7 +244,7 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
     def do(self, context):
         """Markers and figures."""
         body = subject(context)
-        linked.refuse(body)
+        channels.check_local(body)
         if not found_of(body.beyond_mocap_hits):
             raise InputError(f"armature {body.name}", "no hit analysis", "one", "press Hit Analysis")
         played = channels.playing(body)[0]

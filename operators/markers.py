@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene.core import linked
+from ..scene.core import channels
 from ..scene.core.settings import as_setting
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
@@ -31,7 +31,7 @@ class OnMarkers:
     def cloud(context):
         """The cloud; InputError where it belongs to another file."""
         thing = cloud_meant(context)
-        linked.refuse(thing, thing.data)
+        channels.check_local(thing, thing.data)
         return thing
 
     @staticmethod
@@ -239,7 +239,7 @@ places of their joints from it"""
         static = context.view_layer.objects.active
         others = [thing for thing in clouds(context.scene) if thing != static]
         chosen = [thing for thing in others if thing.select_get()] or others
-        linked.refuse(*chosen)
+        channels.check_local(*chosen)
         if static.beyond_mocap_cloud.static in chosen:
             raise InputError(static.name, "its own static trial is among them", "a trial without", "clear it first")
         for thing in chosen:

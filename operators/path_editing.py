@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import linked
+from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import curve, keep_apart, measure, riders
 from ..scene.path_editing.settings import choose, meant
@@ -56,7 +56,7 @@ back"""
 
     def do(self, context):
         """Curve and motion, and the curve active."""
-        linked.refuse(context.scene)
+        channels.check_local(context.scene)
         chosen = bodies(context)
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
         riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]

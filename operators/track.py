@@ -7,7 +7,7 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.drawn import FASTEST
-from ..scene.core import linked
+from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player, is_track
 from ..scene.player import dots, drawn_track, pins
@@ -32,7 +32,7 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
     def do(self, context):
         """Curve, player, dot."""
         scene = context.scene
-        linked.refuse(scene)
+        channels.check_local(scene)
         name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
         drawn = drawn_track.create(context, f"{name} curve", context.collection)
         add_player(context, drawn, name)
@@ -75,7 +75,7 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
     def do(self, context):
         """Read it, so that what is wrong is told, and take it."""
         scene, chosen = context.scene, context.object
-        linked.refuse(scene)
+        channels.check_local(scene)
         player = active_player(scene.beyond_mocap)
         if self.for_active and player is None:
             raise InputError("players", "none in the list", "a player", "switch Active Player off to add one")
@@ -120,7 +120,7 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
     def do(self, context):
         """Set them."""
         drawn = context.object
-        linked.refuse(drawn, drawn.data)
+        channels.check_local(drawn, drawn.data)
         points = chosen(drawn)
         if not points:
             raise InputError(f"curve {drawn.name}", "no point selected", "one or more", "select points in edit mode")
@@ -166,7 +166,7 @@ with G; time and hold stand in the list of pins"""
     def do(self, context):
         """Find the place, refuse a second pin of the part at that time, make it."""
         scene, part = context.scene, self.part.replace("_", " ")
-        linked.refuse(scene)
+        channels.check_local(scene)
         player, seconds = active_player(scene.beyond_mocap), pins.second_now(scene)
         for other in player.pins:
             if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
@@ -195,6 +195,6 @@ class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Remove it and choose its neighbour."""
-        linked.refuse(context.scene)
+        channels.check_local(context.scene)
         player = active_player(context.scene.beyond_mocap)
         pins.remove(player, min(player.active_pin, len(player.pins) - 1))

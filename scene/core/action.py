@@ -15,7 +15,7 @@ from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, at_frames
 from ..rigs import armature
-from . import channels, linked
+from . import channels
 from .measure import frames_per_second, whole_frames
 
 PLACED = "beyond_mocap_placement"
@@ -43,7 +43,7 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
 
     InputError where the armature cannot play it.
     """
-    linked.refuse(body)
+    channels.check_local(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
         raise InputError(

@@ -252,3 +252,12 @@ def _new_curve(bag, path: str, index: int, group: str):
         return curve
     curve.group = bag.groups.get(group) or bag.groups.new(group)
     return curve
+
+
+def check_local(*things: bpy.types.ID | None) -> None:
+    """InputError where one of these is linked from another file: what is written to it is lost with the next load."""
+    for thing in things:
+        if thing is not None and thing.library is not None:
+            found = f"linked from {thing.library.filepath}"
+            step = "use Object > Library Override > Make, or Object > Relations > Make Local"
+            raise InputError(thing.name, found, "one of this file", step)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels, linked
+from ..core import channels
 from ..core.clock import of_scene
 from ..core.measure import frames_per_second
 from ..core.settings import BeyondMocapPlayer, absolute, active_player
@@ -99,7 +99,7 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
     own = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None)
     target = own or ball.create(bpy.context, BALL, room)
-    linked.refuse(target)
+    channels.check_local(target)
     channels.check_free(target)
     possession.check_unaimed(target)
     times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))

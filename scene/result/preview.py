@@ -8,7 +8,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels, linked, session
+from ..core import channels, session
 from ..core.clock import of_scene
 from ..core.set_aside import bring_back, drop, play_as_before, put_aside
 from ..core.settings import BeyondMocapPlayer
@@ -27,7 +27,7 @@ def check(player: BeyondMocapPlayer) -> None:
     body = player.body
     if body is None:
         return
-    linked.refuse(body)
+    channels.check_local(body)
     override = body.override_library
     if override is not None and override.is_system_override:
         raise InputError(f"body {body.name}", "an override that cannot be edited", "an editable override",
