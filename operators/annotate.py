@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ImportHelper
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import areas, popup, window
+from ..scene.core import popup, window
 from ..scene.timeline import video
 from ..scene.timeline.annotating import do, held, name_of, now, type_keys
 from ..scene.timeline.video import drive
@@ -162,7 +162,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             area, region = _largest(context)
         at = (self.pointer[0] - region.x, self.pointer[1] - region.y) if self.state.trail and self.pointer else None
         content = popup.content(self.state, self.who, self.told, self.folded)
-        box = popup.laid_out(content, at, areas.free_part(area, region), popup.letters(), popup.width_of)
+        box = popup.laid_out(content, at, window.free_region(area, region), popup.letters(), popup.width_of)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
         window.redraw(*SPACES)
 
@@ -258,7 +258,7 @@ class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
 
 def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
     """Show the clip in a clip editor: one that is open, else the left half of the largest 3D view, else nowhere."""
-    area = areas.editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
+    area = window.open_editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
     if area is None:
         return
     space = area.spaces.active

@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas, channels, session
+from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import as_setting
 from ..scene.match import cameras, child, load, order, ours, reading, show
@@ -287,7 +287,7 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         if camera is None:
             raise InputError("match", "no camera in the stand", "the one that was laid", "press Show Match again")
         scene.camera = camera
-        area = None if bpy.app.background else areas.largest(context.window.screen, "VIEW_3D")
+        area = None if bpy.app.background else window.largest_editor(context.window.screen, "VIEW_3D")
         if area is not None:
             _look_through(context, area)
 

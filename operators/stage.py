@@ -6,7 +6,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas
+from ..scene.core import window
 from ..scene.path_editing.settings import meant, riders
 from ..scene.stage import path_cameras, stage
 from .verb import Verb
@@ -107,7 +107,7 @@ def _view(context) -> bpy.types.Area | None:
         return None
     if context.area is not None and context.area.type == "VIEW_3D":
         return context.area
-    return areas.largest(context.window.screen, "VIEW_3D")
+    return window.largest_editor(context.window.screen, "VIEW_3D")
 
 
 def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:

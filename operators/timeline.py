@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas
+from ..scene.core import window
 from ..scene.core.live import soon
 from ..scene.core.settings import active_player
 from ..scene.player.subject import can_have, clock, name_of, subject, with_lanes
@@ -104,7 +104,7 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
 
     def do(self, context):
         """Find or open it, show its sidebar and all strips."""
-        area = areas.editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
+        area = window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
         if area is None:
             return
         space = area.spaces.active
@@ -118,13 +118,13 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
 
 def _settle(scene: int) -> None:
     """What an editor takes only once it has been drawn: which tab is in front, and what it shows."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type != "NLA_EDITOR" or window.scene.session_uid != scene:
+    for shown in bpy.context.window_manager.windows:
+        for area in shown.screen.areas:
+            if area.type != "NLA_EDITOR" or shown.scene.session_uid != scene:
                 continue
             regions = {region.type: region for region in area.regions}
             regions["UI"].active_panel_category = "Beyond Mocap"
-            with bpy.context.temp_override(window=window, area=area, region=regions["WINDOW"]):
+            with bpy.context.temp_override(window=shown, area=area, region=regions["WINDOW"]):
                 bpy.ops.nla.view_all()
             area.tag_redraw()
 

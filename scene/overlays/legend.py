@@ -6,7 +6,7 @@ import blf
 import gpu
 from gpu_extras.batch import batch_for_shader
 
-from ..core import areas
+from ..core import window
 from . import colours
 
 SIZE, MARGIN, LINE = 11, 5, 1.4  # points, points, sizes
@@ -55,7 +55,7 @@ def draw(context, on: list[str]) -> None:
     if not rows:
         return
     scale = context.preferences.system.ui_scale
-    left, bottom, _, _ = areas.free_part(context.area, context.region)
+    left, bottom, _, _ = window.free_region(context.area, context.region)
     x, y = left + 8 * scale, bottom + 8 * scale
     for row in reversed(rows):
         y += row(x, y, scale) + 4 * scale

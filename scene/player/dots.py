@@ -10,8 +10,7 @@ import numpy as np
 
 from ...beyond_mocap.motion.track import Track
 from ..core import channels
-from ..core.clock import Clock, of_scene
-from ..core.measure import units_per_metre
+from ..core.measure import Clock, scene_clock, units_per_metre
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
 from ..result import bake
 from .tracks import read_track
@@ -50,7 +49,7 @@ def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.O
     dot = _empty(context.scene, f"{player.name} dot", SIZE, room)
     player.dot = dot
     show(player)
-    clock = of_scene(context.scene)
+    clock = scene_clock(context.scene)
     seconds, places = _measured(track.times, track.positions)
     _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
     if BALL not in room.objects:
@@ -67,7 +66,7 @@ def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     track = read_track(context.scene.beyond_mocap, player)
     seconds, places = _measured(track.times, track.positions)
     channels.discard(dot, MARK)
-    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), of_scene(context.scene))
+    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), scene_clock(context.scene))
 
 
 def show(player: BeyondMocapPlayer) -> None:

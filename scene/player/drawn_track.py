@@ -18,8 +18,7 @@ from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.motion.track import Track
 from ...beyond_mocap.motion.track.drawn import along, moved, nurbs_line
 from ..core import channels
-from ..core.clock import of_scene
-from ..core.measure import units_per_metre
+from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
 FINE = 48  # straight pieces that a Bezier segment is cut into
@@ -56,7 +55,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
     frames, places = _animated(scene, drawn, still)
-    clock = of_scene(scene)
+    clock = scene_clock(scene)
     seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
     return moved(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
 

@@ -9,8 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.synthesis.plan import Pin
-from ..core.clock import of_scene
-from ..core.measure import units_per_metre
+from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
 PARTS = (
@@ -115,4 +114,4 @@ def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
 
 def second_now(scene: bpy.types.Scene) -> float:
     """What the track's clock shows on the scene's present frame."""
-    return of_scene(scene).seconds(scene.frame_current_final)
+    return scene_clock(scene).seconds(scene.frame_current_final)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core.clock import Clock, of_scene
+from ..core.measure import Clock, scene_clock
 from ..core.settings import active_player
 from ..timeline import lanes, strips
 from . import dots
@@ -40,7 +40,7 @@ def with_lanes(context: bpy.types.Context) -> bpy.types.Object:
 
 def clock(context: bpy.types.Context, target: bpy.types.Object) -> Clock:
     """The clock of its seconds: the scene's for a player's dot, its own for a clip."""
-    return of_scene(context.scene) if target.beyond_mocap_dot.player else lanes.written_for(target)
+    return scene_clock(context.scene) if target.beyond_mocap_dot.player else lanes.written_for(target)
 
 
 def name_of(target: bpy.types.Object) -> str:

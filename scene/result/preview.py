@@ -9,7 +9,7 @@ import bpy
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels, session
-from ..core.clock import of_scene
+from ..core.measure import scene_clock
 from ..core.set_aside import bring_back, drop, play_as_before, put_aside
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
@@ -61,8 +61,8 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
         body = bake.player(context, player, made)
     action, slot = channels.playing(body)
     blocks.note(action, made.take, context.scene)
-    hand_keys.note(action, slot, of_scene(context.scene))
-    moved = hand_keys.shift_between(clock, of_scene(context.scene))
+    hand_keys.note(action, slot, scene_clock(context.scene))
+    moved = hand_keys.shift_between(clock, scene_clock(context.scene))
     result.hand_keys = hand_keys.put(action, slot, hand, moved) if moved is not None else 0
     result.state = "PREVIEW"
     error_curves.renew(context.scene, player)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import of_scene
+from ..core.measure import scene_clock
 from ..core.settings import BeyondMocapPlayer, active_player
 from ..timeline import lanes, strips
 from . import blocks
@@ -13,7 +13,7 @@ from . import blocks
 
 def selected(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
     """Player and seconds on the track's clock; InputError where nothing says which."""
-    clock = of_scene(scene)
+    clock = scene_clock(scene)
     for player in scene.beyond_mocap.players:
         frames = _of_result(player) or _of_words(player, scene)
         if frames is not None:

@@ -17,7 +17,7 @@ from ...beyond_mocap.annotation.annotating import AddMoment, AddSpan, AtPlayhead
 from ...beyond_mocap.annotation.decision import Held
 from ...beyond_mocap.base.errors import InputError
 from ..core import session
-from ..core.clock import Clock, of_scene
+from ..core.measure import Clock, scene_clock
 from ..core.settings import absolute, active_player
 from ..player import subject
 from . import lanes, lay_strips, word_checks
@@ -52,7 +52,7 @@ def now(context: bpy.types.Context) -> Now:
     target = subject.subject(context)
     if target is None and not subject.can_have(context):
         raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    clock = scene_clock(context.scene) if target is None else subject.clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
     ends = [placed.span.end for placed in _asked_spans(target)] + [placed.time for placed in _asked_moments(target)]
     return Now(time, 1.0 / clock.fps, max((end for end in ends if end < time - 0.5 / clock.fps), default=None))
@@ -137,7 +137,7 @@ def _add_span(context: bpy.types.Context, span: Span) -> str:
 
 def _at_playhead(context: bpy.types.Context, what: str) -> Done:
     target = subject.subject(context)
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    clock = scene_clock(context.scene) if target is None else subject.clock(context, target)
     found = None if target is None else _found(context, target, clock)
     if what in ("earlier", "later"):
         step = 1 if what == "later" else -1
@@ -190,7 +190,7 @@ def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str
 
 def _next_moment(context: bpy.types.Context, step: int) -> str:
     target = subject.subject(context)
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    clock = scene_clock(context.scene) if target is None else subject.clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
     ahead = [moment for moment in _asked_moments(target) if step * (moment.time - time) > 0.75 / clock.fps]
     if not ahead:

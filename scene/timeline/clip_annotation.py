@@ -14,8 +14,7 @@ import bpy
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline, clip_annotations
 from ...beyond_mocap.base.errors import InputError
 from ..core import action
-from ..core.clock import Clock
-from ..core.measure import frames_per_second
+from ..core.measure import Clock, frames_per_second
 from ..core.settings import absolute
 from ..library.recordings import FOLDER, PATH
 from . import lanes, lay_strips

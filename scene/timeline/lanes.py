@@ -15,7 +15,7 @@ from bpy.props import StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
+from ..core.measure import Clock, nearest_frame
 from .strip_lines import key_of, recorded_span, span_of
 
 WORDS, MOMENTS, AUTOMATIC = "Words", "Moments", "Automatic"

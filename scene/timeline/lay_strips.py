@@ -10,7 +10,7 @@ import bpy
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
+from ..core.measure import Clock, nearest_frame
 from .lanes import (
     AUTOMATIC,
     MOMENTS,

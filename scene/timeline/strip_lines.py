@@ -16,7 +16,7 @@ from bpy.props import EnumProperty, StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
+from ..core.measure import Clock, nearest_frame
 
 NO_WORDS = "(automatic)"  # the name of a span that says nothing: a strip's name cannot be empty
 KINDS = (

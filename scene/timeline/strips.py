@@ -6,7 +6,7 @@ import bpy
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, of_scene
+from ..core.measure import Clock, scene_clock
 from ..core.settings import BeyondMocapPlayer
 from ..player import dots
 from ..player.tracks import read_track
@@ -24,13 +24,13 @@ def read(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
 
 def write(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
     """Let the player's strips say `timeline` and nothing else; his dot is made where there is none."""
-    dot, clock = dots.ensure(context, player), of_scene(context.scene)
+    dot, clock = dots.ensure(context, player), scene_clock(context.scene)
     lay_strips.write(dot, timeline, clock, _extent(dot, clock))
 
 
 def set_automatic(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
     """Show the automatic spans of a take's filled timeline as dimmed strips, in place of those before."""
-    lay_strips.set_automatic(dots.ensure(context, player), timeline, of_scene(context.scene))
+    lay_strips.set_automatic(dots.ensure(context, player), timeline, scene_clock(context.scene))
 
 
 def add_span(
@@ -41,7 +41,7 @@ def add_span(
     if end_s <= start_s:
         raise InputError("span", f"the end {end_s:g} is not after the start {start_s:g}", "START < END")
     span = said(" ".join(words), start_s, end_s)
-    return lay_strips.add_span(with_lanes(context, player), span, of_scene(context.scene))
+    return lay_strips.add_span(with_lanes(context, player), span, scene_clock(context.scene))
 
 
 def add_moment(
@@ -49,7 +49,7 @@ def add_moment(
 ) -> PlacedMoment:
     """One more key moment, picked; InputError where its words are not of the form."""
     key = said(" ".join(words), time_s)
-    return lay_strips.add_moment(with_lanes(context, player), key, of_scene(context.scene))
+    return lay_strips.add_moment(with_lanes(context, player), key, scene_clock(context.scene))
 
 
 def remove(player: BeyondMocapPlayer, placed: PlacedSpan | PlacedMoment) -> None:

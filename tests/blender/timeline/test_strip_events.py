@@ -27,7 +27,7 @@ def dot(room, parse):
     made = bpy.data.objects.new("dot", None)
     bpy.context.scene.collection.objects.link(made)
     timeline = parse("1.013 3.007 running\n3.007 5 walking\n2.222 kick\n4.444 header\n")
-    room("timeline.lay_strips").write(made, timeline, room("core.clock").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
+    room("timeline.lay_strips").write(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
     return made
 
 
