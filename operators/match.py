@@ -11,7 +11,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import as_setting
-from ..scene.match import cameras, child, load, order, ours, reading, show
+from ..scene.match import cameras, child, load, order, ours, show
 from ..scene.match.settings import active_of, typed
 from ..scene.rigs import export, rig
 from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
@@ -70,18 +70,18 @@ The first minute is chosen"""
         beside it."""
         dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
         chosen = str(max(dropped, key=_size)) if self.directory and dropped else self.filepath
-        return reading.order_of(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
+        return order.reading_order(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
-    def work(order, progress, cancelled, hurry):
+    def work(asked, progress, cancelled, hurry):
         """Read them."""
-        return reading.work(order, progress)
+        return order.read_match(asked, progress)
 
     def apply(self, scene, result):
         """The list."""
-        order, read = result
+        asked, read = result
         match = scene.beyond_mocap_match
-        reading.fill(match, order, read)
+        order.fill_match(match, asked, read)
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")

@@ -213,10 +213,6 @@ def joined(parts: list, name: str, slot_name: str):
     return built(name, slot_name, tables, models)
 
 
-def _appended(before: dict | None, after: dict) -> dict:
-    return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
-
-
 def keyed_range(found: dict) -> tuple[int, int] | None:
     """First and last whole frame between the outermost keys of curves from `curves`; None where there is no key."""
     ends = [curve.range() for curve in found.values() if len(curve.keyframe_points)]
@@ -238,6 +234,19 @@ def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
     return np.array([curve.evaluate(frame) for frame in frames])
 
 
+def check_local(*things: bpy.types.ID | None) -> None:
+    """InputError where one of these is linked from another file: what is written to it is lost with the next load."""
+    for thing in things:
+        if thing is not None and thing.library is not None:
+            found = f"linked from {thing.library.filepath}"
+            step = "use Object > Library Override > Make, or Object > Relations > Make Local"
+            raise InputError(thing.name, found, "one of this file", step)
+
+
+def _appended(before: dict | None, after: dict) -> dict:
+    return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
+
+
 def _channelbag(action, slot):
     layer = action.layers[0] if action.layers else action.layers.new("Layer")
     strip = layer.strips[0] if layer.strips else layer.strips.new(type="KEYFRAME")
@@ -252,12 +261,3 @@ def _new_curve(bag, path: str, index: int, group: str):
         return curve
     curve.group = bag.groups.get(group) or bag.groups.new(group)
     return curve
-
-
-def check_local(*things: bpy.types.ID | None) -> None:
-    """InputError where one of these is linked from another file: what is written to it is lost with the next load."""
-    for thing in things:
-        if thing is not None and thing.library is not None:
-            found = f"linked from {thing.library.filepath}"
-            step = "use Object > Library Override > Make, or Object > Relations > Make Local"
-            raise InputError(thing.name, found, "one of this file", step)

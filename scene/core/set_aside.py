@@ -90,10 +90,6 @@ def stance_of(target: bpy.types.Object) -> dict:
     return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
 
 
-def _stands(thing) -> list:
-    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
-
-
 def stand(target: bpy.types.Object, stance: dict) -> None:
     """Let object and bones stand as `stance_of` said."""
     for name, (mode, *values) in stance.items():
@@ -126,6 +122,10 @@ def scene_aside(name: str):
         bpy.data.batch_remove([item for item in came if not isinstance(item, bpy.types.Scene)])
         for item in [item for item in came if isinstance(item, bpy.types.Scene)]:
             bpy.data.scenes.remove(item)
+
+
+def _stands(thing) -> list:
+    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
 
 
 def _all_data() -> dict:

@@ -100,6 +100,11 @@ def free_region(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, 
     return (left + 4, bottom + 4, max(right - 4, left + 40), max(top - 4, bottom + 20))
 
 
+def largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
+    """The largest editor of a kind; None where there is none."""
+    return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)
+
+
 def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
     view = largest_editor(window.screen, "VIEW_3D")
     if view is None:
@@ -111,8 +116,3 @@ def _split(context, window, kind: str, direction: str, factor: float) -> bpy.typ
     new = min((*halves, view), key=lambda area: area.x if direction == "VERTICAL" else area.y)
     new.type = kind
     return new
-
-
-def largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None:
-    """The largest editor of a kind; None where there is none."""
-    return max((area for area in screen.areas if area.type == kind), key=lambda a: a.width * a.height, default=None)

@@ -1,4 +1,5 @@
-"""A folder of a made match as what the scene shows of a stretch of it; in any thread, never touching bpy."""
+"""A folder of a made match as what the scene shows of a stretch of it, as plain values and arrays; in any thread, never
+touching bpy."""
 
 from __future__ import annotations
 
@@ -10,13 +11,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beyond_mocap.base.errors import Cancelled, InputError, told_time
-from .people import TEAMS, Person, Scenery
+from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.motion.track.ball_path import BallPath
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.motion.track.ball_path import BallPath
 
 LIBRARYS_SHARE = 0.1  # of the bar
+TEAMS = ("home", "away", "referee")
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A player or referee. id: as the feed has it. number: of the shirt, -1 where there is none. team: one of TEAMS.
+    motions: (s on the match's clock, motion) for every stretch in which he is there, in order."""
+
+    id: str
+    name: str
+    number: int
+    team: str
+    keeper: bool
+    motions: tuple[tuple[float, Motion], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scenery:
+    """A stretch of a match: start and end, s on its clock; length and width of the pitch, m; colours: team -> "#RRGGBB"
+    of the shirts; who is there; the ball, where it is known."""
+
+    start: float
+    end: float
+    length: float
+    width: float
+    colours: dict[str, str]
+    people: tuple[Person, ...]
+    ball: BallPath | None
 
 
 @dataclass(frozen=True)
