@@ -33,6 +33,22 @@ class Mesh:
     width: float = 1.0
 
 
+def line_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """A broken line through points (T, 3) m."""
+    return repeated_mesh(shapes.along(points), colour, width, alpha)
+
+
+def segments_mesh(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """Lines from start to end, both (..., 3) m."""
+    points = np.stack([start, end], axis=-2).reshape(-1, 3).astype(np.float32)
+    return repeated_mesh(points, colour, width, alpha)
+
+
+def repeated_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """Lines of one colour between pairs of points (2 N, 3) m."""
+    return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
+
+
 @dataclass(frozen=True)
 class Piece:
     """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it
@@ -151,10 +167,7 @@ def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
     if not len(seams):
         return ()
     points = shapes.bars(pelvis, np.asarray(seams, int), HALF_SEAM, SEAM)
-    return (
-        Mesh("LINES", points, colours.repeated(colours.BLACK, len(points), 0.8), 5.0),
-        Mesh("LINES", points, colours.repeated(colours.SEAM, len(points)), 2.5),
-    )
+    return repeated_mesh(points, colours.BLACK, 5.0, 0.8), repeated_mesh(points, colours.SEAM, 2.5)
 
 
 def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
@@ -183,12 +196,9 @@ def _speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
         return ()
     asked, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.asked_speed, figures.speed))
     fill = shapes.curtain(path, asked, SPEED_FOOT)
-    over = [shapes.along(np.concatenate([path, top[:, None]], axis=1)) for top in (asked, played)]
-    return (
-        Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
-        Mesh("LINES", over[0], colours.repeated(colours.ASKED, len(over[0])), 1.5),
-        Mesh("LINES", over[1], colours.repeated(colours.PLAYED, len(over[1])), 2.0),
-    )
+    over = [np.concatenate([path, top[:, None]], axis=1) for top in (asked, played)]
+    return (Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
+            line_mesh(over[0], colours.ASKED, 1.5), line_mesh(over[1], colours.PLAYED, 2.0))
 
 
 def _pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:

@@ -146,8 +146,8 @@ def test_what_is_drawn_follows_the_body(shown, room, scale):
     take = room("core.session").made(scene.beyond_mocap.players[0].take).take
     body.location, body.rotation_euler, body.scale = (3.0 / scale, -2.0, 0.0), (0.0, 0.0, 1.1), (1.5, 1.5, 1.5)
     scene.frame_set(31)
-    world = room("overlays.place").take_to_world(scene, body)
-    at = room("overlays.place").seconds_at(scene) - take.start_time
+    world = room("overlays.store").take_to_world(scene, body)
+    at = room("overlays.store").seconds_at(scene) - take.start_time
     bone = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[take.motion.skeleton.names[0]]
     root = [
         np.interp(at * take.motion.fps, np.arange(len(take.motion)), take.motion.root_positions[:, i]) for i in range(3)
@@ -161,7 +161,7 @@ def test_accepted_results_still_know_where_they_lay(shown, room, form):
     body = bpy.context.scene.beyond_mocap.players[0].body
     body.location.x += 2.0
     bpy.context.view_layer.update()
-    assert room("overlays.place").take_to_world(bpy.context.scene, body).translation.x == pytest.approx(2.0, abs=1e-5)
+    assert room("overlays.store").take_to_world(bpy.context.scene, body).translation.x == pytest.approx(2.0, abs=1e-5)
 
 
 def test_lines_of_the_report_keep_their_seconds(shown):
