@@ -11,9 +11,9 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
 from ..scene.core.settings import active_player, as_setting
 from ..scene.player import dots, pins, tracks
-from ..scene.player.subject import show
-from ..scene.result import bake, plans, preview
+from ..scene.result import bake, preview
 from ..scene.timeline import strip_events, strips, word_checks
+from ..scene.timeline.strips import show_player
 from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
@@ -81,7 +81,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             dots.ensure(context, player)
             if player.annotation_file:
                 track = tracks.read_track(context.scene.beyond_mocap, player)
-                words = plans.written_words(player, context.scene.beyond_mocap.rate, track)
+                words = strips.written_words(player, context.scene.beyond_mocap.rate, track)
                 strips.write(context, player, words)
                 self.tell_words(context.scene, player, words)
             elif not player.feed_id:
@@ -170,7 +170,7 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
         player = settings.players.get(self.player) if self.player else active
         if player is None:
             raise InputError("player", f"{self.player!r} is not in the list", "a player in the list")
-        show(context, player)
+        show_player(context, player)
         if context.area is not None and context.area.type == "NLA_EDITOR":
             context.space_data.dopesheet.show_only_selected = True
 
@@ -196,7 +196,7 @@ strips. Files of earlier versions need this once; texts and files stay as they a
             if strips.dot_of(player, context.scene) is not None:
                 continue
             try:
-                read.append((player, plans.written_words(player, settings.rate, tracks.read_track(settings, player))))
+                read.append((player, strips.written_words(player, settings.rate, tracks.read_track(settings, player))))
             except InputError as error:
                 troubles.append(f"{player.name}: {error}")
         if not read:

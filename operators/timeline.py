@@ -11,10 +11,10 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
 from ..scene.core.live import soon
 from ..scene.core.settings import active_player
-from ..scene.player.subject import can_have, clock, name_of, subject, with_lanes
 from ..scene.result import bake
 from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
 from ..scene.timeline.strip_lines import said
+from ..scene.timeline.strips import can_have_timeline, subject_clock, subject_name, subject_with_lanes, timeline_subject
 from .verb import Verb
 
 
@@ -25,7 +25,7 @@ class TimelineVerb(Verb):
     def poll(cls, context):
         """There is somebody with strips."""
         cls.poll_message_set("Import tracking in step 2 first, and bring its players to the timeline")
-        return subject(context) is not None
+        return timeline_subject(context) is not None
 
     def attempt(self, action):
         """As ever; the lines about words are worked out anew."""
@@ -41,7 +41,7 @@ class WritingVerb(TimelineVerb):
     def poll(cls, context):
         """There is a player."""
         cls.poll_message_set("Import tracking in step 2 first")
-        return can_have(context)
+        return can_have_timeline(context)
 
 
 class MomentVerb(TimelineVerb):
@@ -53,7 +53,7 @@ class MomentVerb(TimelineVerb):
         if not super().poll(context):
             return False
         cls.poll_message_set("Pick a key moment first: click its name in the NLA editor or in the list")
-        return is_picked(subject(context))
+        return is_picked(timeline_subject(context))
 
 
 def is_picked(target: bpy.types.Object) -> bool:
@@ -65,7 +65,7 @@ def picked(target: bpy.types.Object) -> lanes.PlacedMoment:
     """The picked key moment; InputError where there is none."""
     found = next((moment for moment in lanes.moments(target) if moment.selected), None)
     if found is None:
-        raise InputError(name_of(target), "no key moment is picked", "one", "click its name in the NLA editor")
+        raise InputError(subject_name(target), "no key moment is picked", "one", "click its name in the NLA editor")
     return found
 
 
@@ -86,7 +86,7 @@ def draw_complaints(layout, context: bpy.types.Context, item) -> None:
 
 def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
     """The playhead, in seconds on the clock of the object's strips."""
-    return clock(context, target).seconds(context.scene.frame_current_final)
+    return subject_clock(context, target).seconds(context.scene.frame_current_final)
 
 
 class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
@@ -202,12 +202,12 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Pick it, and go there."""
-        target = subject(context)
+        target = timeline_subject(context)
         strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
         markers = strip.action.pose_markers
         if not 0 <= self.index < len(markers):
-            raise InputError(name_of(target), f"key moment {self.index} of strip {strip.name!r}", "one that is there",
-                             f"it has {len(markers)}")
+            found = f"key moment {self.index} of strip {strip.name!r}"
+            raise InputError(subject_name(target), found, "one that is there", f"it has {len(markers)}")
         lay_strips.pick(target, strip.name, self.index)
         context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))
 
@@ -307,8 +307,8 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
     def do(self, context):
         """Set the marker, picked."""
         said(self.words, 0.0)
-        target = with_lanes(context)
-        lay_strips.add_moment(target, said(self.words, playhead(context, target)), clock(context, target))
+        target = subject_with_lanes(context)
+        lay_strips.add_moment(target, said(self.words, playhead(context, target)), subject_clock(context, target))
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
@@ -321,7 +321,7 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
 
     def do(self, context):
         """Put its marker there."""
-        target = subject(context)
+        target = timeline_subject(context)
         moment, clock = picked(target), lanes.written_for(target)
         time = clock.seconds(moment.frame + self.frames) if self.frames else playhead(context, target)
         lay_strips.change_moment(target, moment.strip, moment.index, replace(moment.key, time=time))
@@ -335,6 +335,6 @@ class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
 
     def do(self, context):
         """Remove its marker."""
-        target = subject(context)
+        target = timeline_subject(context)
         moment = picked(target)
         lay_strips.remove_moment(target, moment.strip, moment.index)

@@ -13,10 +13,9 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core.settings import active_player, as_setting
 from ..scene.library import recordings
 from ..scene.player import tracks
-from ..scene.player.subject import clip, clock, name_of, subject, with_lanes
-from ..scene.result import plans
 from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
 from ..scene.timeline.strip_lines import said, words_of
+from ..scene.timeline.strips import active_clip, subject_clock, subject_name, subject_with_lanes, timeline_subject
 from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
 from .verb import ImportVerb, Verb
 
@@ -54,14 +53,14 @@ playhead on"""
         if end <= start:
             raise InputError("span", f"the end {end:g} is not after the start {start:g}", "START < END")
         span = said(self.words, start, end)
-        target = with_lanes(context)
-        lay_strips.add_span(target, span, clock(context, target))
+        target = subject_with_lanes(context)
+        lay_strips.add_span(target, span, subject_clock(context, target))
 
     @staticmethod
     def stretch(context) -> tuple[float, float]:
         """The preview range, or a second from the playhead on."""
-        scene, there = context.scene, subject(context) or with_lanes(context)
-        time = clock(context, there)
+        scene, there = context.scene, timeline_subject(context) or subject_with_lanes(context)
+        time = subject_clock(context, there)
         if scene.use_preview_range:
             return time.seconds(scene.frame_preview_start), time.seconds(scene.frame_preview_end)
         return time.seconds(scene.frame_current), time.seconds(scene.frame_current) + 1.0
@@ -75,13 +74,14 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Each becomes two."""
-        target = subject(context)
+        target = timeline_subject(context)
         time, clock = playhead(context, target), lanes.written_for(target)
         frame = clock.whole(time)
         there = [span for span in lanes.spans(target) if span.first < frame < span.last and not span.automatic]
         there = [span for span in there if span.selected] or there
         if not there:
-            raise InputError(name_of(target), "no span is under the playhead", "one", "put the playhead into a strip")
+            found = "no span is under the playhead"
+            raise InputError(subject_name(target), found, "one", "put the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
@@ -99,15 +99,16 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         if not super().poll(context):
             return False
         cls.poll_message_set("Select two or more strips of one player first")
-        chosen = [strip for _, strip in lanes.strips(subject(context)) if strip.select]
+        chosen = [strip for _, strip in lanes.strips(timeline_subject(context)) if strip.select]
         return sum(strip.action.beyond_mocap.kind != "moments" for strip in chosen) > 1
 
     def do(self, context):
         """The first one is lengthened, the others go; their key moments stay."""
-        target = subject(context)
+        target = timeline_subject(context)
         chosen = selected_spans(target)
         if len(chosen) < 2:
-            raise InputError(name_of(target), "fewer than two spans are selected", "two or more", "select their strips")
+            found = "fewer than two spans are selected"
+            raise InputError(subject_name(target), found, "two or more", "select their strips")
         inner = [moment.key for moment in lanes.moments(target) if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:
             lay_strips.remove_span(target, placed.strip)
@@ -128,13 +129,13 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Change all whose words have a side."""
-        target = subject(context)
+        target = timeline_subject(context)
         moments = [moment for moment in lanes.moments(target) if moment.selected]
         sided = [placed for placed in moments if _mirrored(placed.key) != placed.key]
         spans = [placed for placed in selected_spans(target) if _mirrored(placed.span) != placed.span]
         if not (sided or spans):
             found = "nothing with left or right is selected"
-            raise InputError(name_of(target), found, "a span or key moment with a side", "select one")
+            raise InputError(subject_name(target), found, "a span or key moment with a side", "select one")
         for placed in sided:
             lay_strips.change_moment(target, placed.strip, placed.index, _mirrored(placed.key))
         for placed in spans:
@@ -163,16 +164,16 @@ or that the library does not have, are told while you type"""
 
     def load(self, context):
         """The words that are there now."""
-        self.words = words_of(_item(chosen(subject(context))))
+        self.words = words_of(_item(chosen(timeline_subject(context))))
 
     def draw(self, context):
         """The words, and what is wrong with them."""
         self.layout.prop(self, "words", text="")
-        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(subject(context))))
+        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(timeline_subject(context))))
 
     def do(self, context):
         """Write them."""
-        target = subject(context)
+        target = timeline_subject(context)
         placed = chosen(target)
         item = _said(self.words, placed)
         if isinstance(placed, lanes.PlacedMoment):
@@ -189,7 +190,7 @@ def chosen(target: bpy.types.Object):
         return moments[0]
     if len(spans) != 1:
         found = f"no key moment is picked and {len(spans)} spans are selected"
-        raise InputError(name_of(target), found, "one of them", "click the name of a key moment, or one strip")
+        raise InputError(subject_name(target), found, "one of them", "click the name of a key moment, or one strip")
     return spans[0]
 
 
@@ -221,10 +222,10 @@ text. Strips and key moments that are there now are replaced"""
         """Read all of it, then lay the strips."""
         settings = context.scene.beyond_mocap
         player = active_player(settings)
-        timeline = plans.written_words(player, settings.rate, tracks.read_track(settings, player))
+        timeline = strips.written_words(player, settings.rate, tracks.read_track(settings, player))
         strips.write(context, player, timeline)
         told = f"{player.name}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments"
-        self.report({"INFO"}, f"{told} from {plans.written_in(player)}")
+        self.report({"INFO"}, f"{told} from {strips.written_in(player)}")
 
 
 class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
@@ -236,12 +237,12 @@ becomes the player's text in step 2"""
 
     def do(self, context):
         """Into the player's text, where there is one, else a new one."""
-        target = subject(context)
-        words = format_timeline(lanes.read(target, name_of(target)))
-        player = None if clip(context) else active_player(context.scene.beyond_mocap)
+        target = timeline_subject(context)
+        words = format_timeline(lanes.read(target, subject_name(target)))
+        player = None if active_clip(context) else active_player(context.scene.beyond_mocap)
         text = player.annotation_text if player else None
         if text is None or text.library is not None:
-            text = bpy.data.texts.new(f"{name_of(target)} words")
+            text = bpy.data.texts.new(f"{subject_name(target)} words")
         text.clear()
         text.write(words)
         if player:
@@ -264,8 +265,8 @@ seconds"""
         """Write the file."""
         if not self.filepath:
             raise InputError("export", "no file given", "a place to write", "choose one")
-        target = subject(context)
-        words = format_timeline(lanes.read(target, name_of(target)))
+        target = timeline_subject(context)
+        words = format_timeline(lanes.read(target, subject_name(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
             file.write(words)
         self.report({"INFO"}, f"{words.count(chr(10))} lines in {self.filepath}")

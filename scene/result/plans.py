@@ -11,7 +11,7 @@ from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from ..player import pins
 from ..player.tracks import read_track
 from ..timeline import strips
-from ..timeline.written import written_in, written_words
+from ..timeline.strips import written_in, written_words
 
 
 def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:

@@ -10,9 +10,9 @@ from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, 
 from ...beyond_mocap.base.errors import InputError
 from ..core import session
 from ..core.settings import absolute
-from ..player.subject import name_of
 from . import lanes
 from .strip_lines import KEPT, base_name, key_of, span_of
+from .strips import subject_name
 
 
 class BeyondMocapProblem(bpy.types.PropertyGroup):
@@ -53,7 +53,7 @@ def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True
 def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
     """(frame, line) for everything that is wrong with an object's strips, in time order."""
     found, timeline, asked = [], [], bool(target.beyond_mocap_dot.player)
-    clock, where = lanes.written_for(target), name_of(target)
+    clock, where = lanes.written_for(target), subject_name(target)
     for track, strip in lanes.strips(target):
         if strip.mute or track.mute:
             continue

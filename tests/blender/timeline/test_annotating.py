@@ -103,7 +103,7 @@ def test_mirror_remove_and_nudge_take_what_is_at_the_playhead(room, players):
 
 def test_a_spans_side_is_mirrored_too(room, players):
     keys("IN", 10.0)
-    room("timeline.strips").add_span(bpy.context, players[0], 9.0, 10.0, ("dribble", "left"))
+    bpy.ops.beyond_mocap.add_span(words="dribble left", start=9.0, end=10.0)
     keys("MIRROR", 9.5)
     assert (9.0, 10.0, "dribble right") in said(room, players[0])[0]
 
@@ -132,7 +132,7 @@ def test_what_has_no_side_cannot_be_mirrored(room, players):
 def test_arrows_go_from_moment_to_moment_and_pick_it(room, players, scene):
     keys("NEXT", 0.0)
     assert scene.frame_current == 126
-    assert [moment.time for moment in room("timeline.strips").moments(players[0], scene) if moment.selected] == [5.0]
+    assert [moment.time for moment in room("timeline.lanes").moments(players[0].dot) if moment.selected] == [5.0]
     keys("NEXT")
     assert scene.frame_current == 201
     keys("NEXT")

@@ -200,7 +200,7 @@ def test_another_frame_rate_of_the_scene(room, tmp_path, core):
     assert room("timeline.strips").read(player, scene) == before
     assert room("timeline.strip_events").put_in_order(scene)
     assert room("timeline.strips").read(player, scene) == before
-    assert room("timeline.strips").moments(player, scene)[0].frame == round(101 + 6.022 * 24 / 1.001)
+    assert room("timeline.lanes").moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
     scene.render.fps = 30
     strip = next(strip for track, strip in room("timeline.lanes").strips(player.dot) if strip.name == "running")
     strip.name = "take 5 #"  # which nobody can read: all of it waits, and says so
