@@ -9,7 +9,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import session
 from ..scene.core.settings import active_player
-from ..scene.result import error_curves, preview, variants
+from ..scene.result import preview, quality
 from .turns import show_automatic
 from .verb import Verb
 
@@ -112,7 +112,7 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
         player = self.chosen(context)[0] if self.player else active_player(context.scene.beyond_mocap)
         if player is None:
             raise InputError("preview", "no player is chosen", "a player with variants", "choose one in step 2")
-        variants.show(context, player, self.number - 1)
+        preview.show_variant(context, player, self.number - 1)
         show_automatic(context, player)
 
 
@@ -130,7 +130,9 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
         """A player with a body."""
         cls.poll_message_set("Synthesize first: the active player has no body with a take")
         player = active_player(context.scene.beyond_mocap)
-        return player is not None and player.body is not None and bool(player.take or error_curves.there(player.body))
+        if player is None or player.body is None:
+            return False
+        return bool(player.take) or quality.has_error_curves(player.body)
 
     def do(self, context):
         """Write or remove them."""
@@ -140,8 +142,8 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
         if player.body.library is not None or player.body.data.library is not None:
             raise InputError(f"body {player.body.name}", "linked from another file", "an armature of this file")
         if self.remove:
-            error_curves.remove(player.body)
+            quality.remove_error_curves(player.body)
         elif session.made(player.take) is None:
             raise InputError(f"player {player.name}", "no take in this session", "a take", "synthesize again")
         else:
-            error_curves.write(context.scene, player)
+            quality.write_error_curves(context.scene, player)

@@ -10,7 +10,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import rows_of
 from ..scene.core import background, session
 from ..scene.core.settings import active_player
-from ..scene.result import freshness, orders, queue, stretch
+from ..scene.result import freshness, orders, plans, queue
 from .turns import TurnsVerb
 
 
@@ -137,11 +137,11 @@ of an accepted result, of a selected span of words, or the preview range. All el
         """The seconds that were named, or those of what is selected."""
         settings = context.scene.beyond_mocap
         if self.end > self.start:
-            player = settings.players.get(self.player) if self.player else stretch.player_shown(context.scene)
+            player = settings.players.get(self.player) if self.player else plans.player_shown(context.scene)
             if player is None:
                 raise InputError("a stretch made anew", f"no player {self.player!r}", "a player with a take")
             return [(player, orders.How("stretch", self.start, self.end))]
-        player, start, end = stretch.selected(context.scene)
+        player, start, end = plans.selected_stretch(context.scene)
         return [(player, orders.How("stretch", start, end))]
 
 

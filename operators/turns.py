@@ -18,7 +18,7 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, session
 from ..scene.core.window import start_clock, stop_clock
 from ..scene.player import dots
-from ..scene.result import freshness, orders, plans, preview, quality, queue, variants
+from ..scene.result import freshness, orders, plans, preview, quality, queue
 from ..scene.timeline import strips
 from .library import summary
 from .verb import Verb
@@ -31,9 +31,9 @@ def written(context, player, order, result) -> None:
     shown = []
     for one in result.takes:
         lines = {
-            "quality": quality.quality(one.report),
-            "moments": quality.moments(one.report),
-            "warnings": quality.warnings(one.report, order.warnings, result.library.notes),
+            "quality": quality.quality_lines(one.report),
+            "moments": quality.moment_lines(one.report),
+            "warnings": quality.warning_lines(one.report, order.warnings, result.library.notes),
             "recipe": json.dumps(one.recipe),
             "made_of": json.dumps(result.made_of),
         }
@@ -41,7 +41,7 @@ def written(context, player, order, result) -> None:
     preview.show(context, player, *shown[0])
     if player.drawn_track is not None:
         dots.renew(context, player)
-    variants.keep(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
+    preview.keep_variants(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
     freshness.dirty()
     show_automatic(context, player)
 

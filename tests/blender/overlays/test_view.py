@@ -180,7 +180,7 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
-    lines = room("result.quality").quality(report).splitlines()
+    lines = room("result.quality").quality_lines(report).splitlines()
     assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed",
                      "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
 
@@ -244,9 +244,9 @@ def test_error_curves_go_with_the_take(shown, room):
     first = bpy.context.scene.beyond_mocap.players[0].body.data.animation_data.action.name
     bpy.ops.beyond_mocap.synthesize()  # a preview: the curves are those of the new take
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert room("result.error_curves").there(player.body) and player.body.data.animation_data.action.name == first
+    assert room("result.quality").has_error_curves(player.body) and player.body.data.animation_data.action.name == first
     bpy.ops.beyond_mocap.discard()
-    assert room("result.error_curves").there(bpy.context.scene.beyond_mocap.players[0].body)
+    assert room("result.quality").has_error_curves(bpy.context.scene.beyond_mocap.players[0].body)
     bpy.ops.beyond_mocap.error_curves(remove=True)
     assert {action.name for action in bpy.data.actions} == before
 
