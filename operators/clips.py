@@ -20,7 +20,6 @@ from ..beyond_mocap.motion.quaternion import about_up, rotate
 from ..scene.core import action, channels
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
-from ..scene.timeline import clip_annotation
 from .verb import BackgroundVerb, ImportVerb, Verb
 
 
@@ -304,7 +303,7 @@ def _draft_of(rig, context) -> assets.Draft:
     """What an armature plays, with the words of its strips where it has any."""
     motion, item = action.read(rig, context.scene), channels.playing(rig)[0]
     try:
-        rows = clip_annotation.said_at(rig, motion.fps, len(motion))
+        rows = recordings.read_words_at(rig, motion.fps, len(motion))
     except InputError:
         rows = ()
     return assets.draft(item.name, motion, rows, f"{motion.duration:.1f} s", item.name)

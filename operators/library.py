@@ -14,8 +14,7 @@ from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import preferences, session, window
 from ..scene.core.settings import absolute, as_setting
-from ..scene.library import clips, foreign, recordings, watch
-from ..scene.timeline import clip_annotation
+from ..scene.library import clips, foreign, recordings
 from .verb import BackgroundVerb, Verb
 
 if TYPE_CHECKING:
@@ -165,7 +164,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         from ..beyond_mocap.library.build import build
         from ..beyond_mocap.library.listing import listed, scanned
 
-        files = watch.look(order.folder) or {}
+        files = clips.list_files(order.folder) or {}
         asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
         try:
             built = build(order.folder, **asked, progress=progress, cancelled=cancelled)
@@ -221,7 +220,7 @@ Library"""
         """The folder."""
         settings = context.scene.beyond_mocap
         folder = absolute(settings.library_folder)
-        watch.check(context.scene)
+        clips.check_folder(context.scene)
         built = session.library(folder, settings.library_unit or None)
         return ListOrder(settings.library_folder, folder, preferences.cache_folder(folder), built)
 
@@ -231,7 +230,7 @@ Library"""
         from ..beyond_mocap.library.listing import listed, scanned
 
         progress(0.0, "Listing clips")
-        files = watch.look(order.folder)
+        files = clips.list_files(order.folder)
         if files is None:
             raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
         found = listed(order.built) if order.built is not None else scanned(order.folder, order.cache_dir)
@@ -261,7 +260,7 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
 
     def invoke(self, context, _event):
         """Look beside the file first; ask where nothing is found."""
-        if watch.relink(context.scene):
+        if clips.relink_library(context.scene):
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
@@ -270,16 +269,16 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         """Set the folder."""
         settings = context.scene.beyond_mocap
         chosen = bpy.path.abspath(self.directory) if self.directory else ""
-        if chosen and not watch.holds_recordings(chosen):
+        if chosen and not clips.holds_recordings(chosen):
             raise InputError(chosen, "no recordings below it", "the library's folder", "choose another")
         if chosen:
             settings.library_folder = as_setting(chosen)
-        elif not os.path.isdir(absolute(settings.library_folder)) and not watch.relink(context.scene):
+        elif not os.path.isdir(absolute(settings.library_folder)) and not clips.relink_library(context.scene):
             raise InputError(
                 absolute(settings.library_folder), "no such folder, nor one like it beside this file",
                 "the library's folder", "choose it in Relink Library",
             )
-        watch.check(context.scene)
+        clips.check_folder(context.scene)
         self.report({"INFO"}, f"library: {absolute(settings.library_folder)}")
 
 
@@ -293,8 +292,8 @@ action"""
     def do(self, context):
         """Read the file, then make the armature."""
         path = self.clip(context)
-        clip, notes = recordings.read(context.scene.beyond_mocap, path)
-        body = recordings.show(context, clip, path, self.dressed)
+        clip, notes = recordings.read_recording(context.scene.beyond_mocap, path)
+        body = recordings.show_recording(context, clip, path, self.dressed)
         for note in notes:
             self.report({"INFO"}, f"{body.name}: {note}")
         self.report({"INFO"}, f"{body.name}: {clip.duration:.1f} s, {len(clip)} frames at {clip.fps:g} per second")
@@ -311,7 +310,7 @@ were not saved are lost"""
     def poll(cls, context):
         """An armature that shows a clip."""
         cls.poll_message_set("Select the armature of a clip that came from the library's list")
-        return bool(clip_annotation.shown(context.object))
+        return bool(recordings.shown_clip(context.object))
 
     def do(self, context):
         """Remove it."""
@@ -320,4 +319,4 @@ were not saved are lost"""
             raise InputError(rig.name, "it belongs to another file", "an object of this file")
         if rig.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        clip_annotation.remove(rig)
+        recordings.remove_clip(rig)

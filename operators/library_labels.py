@@ -13,7 +13,7 @@ from ..scene.core import preferences, session
 from ..scene.core.settings import absolute
 from ..scene.core.window import clear_status
 from ..scene.library import clips, recordings
-from ..scene.timeline import clip_annotation, lanes, proposals
+from ..scene.timeline import lanes, proposals
 from .annotate import SPACES
 from .library import ClipVerb, FolderVerb
 from .verb import Verb
@@ -26,7 +26,7 @@ class OpenClipVerb(Verb):
     def poll(cls, context):
         """An armature that shows a clip."""
         cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
-        return bool(clip_annotation.shown(context.object))
+        return bool(recordings.shown_clip(context.object))
 
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
@@ -41,13 +41,13 @@ the NLA editor. Change them there, or have words proposed, then press Save Words
         from ..beyond_mocap.library.keep_words import as_timeline, read_sources, read_words
 
         settings, path = context.scene.beyond_mocap, self.clip(context)
-        motion, _ = recordings.read(settings, path)
+        motion, _ = recordings.read_recording(settings, path)
         folder = recordings.folder_of(settings)
         rows = read_words(folder / path, folder, motion.fps)
         timeline = as_timeline(rows, motion.fps)
         said = read_sources(folder / path, folder, rows, motion.fps)
-        rig = recordings.show(context, motion, path, self.dressed)
-        clip_annotation.lay(rig, context.scene, motion, timeline)
+        rig = recordings.show_recording(context, motion, path, self.dressed)
+        recordings.lay_words(rig, context.scene, motion, timeline)
         for row, (source, confidence) in said.items():
             proposals.add(rig, row, source, confidence, "ACCEPTED")
         self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of words")
@@ -83,7 +83,7 @@ yours to add"""
         from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
 
         settings, rig = context.scene.beyond_mocap, context.object
-        motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
+        motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
         built = session.library(absolute(settings.library_folder), settings.library_unit or None)
         try:
             gaits = gaits_of(built) if built is not None else GAITS
@@ -98,7 +98,7 @@ yours to add"""
         told = as_timeline([one.annotation for one in found], motion.fps)
         if before is not None:
             told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
-        clip_annotation.lay(rig, context.scene, motion, told)
+        recordings.lay_words(rig, context.scene, motion, told)
         proposals.keep(rig, found, "ACCEPTED", beside=not self.replace)
         for one in found:
             row = one.annotation
@@ -115,7 +115,7 @@ yours to add"""
         from ..beyond_mocap.annotation import Timeline
 
         if not lanes.has(rig):
-            clip_annotation.lay(rig, scene, motion, Timeline())
+            recordings.lay_words(rig, scene, motion, Timeline())
         said = lanes.read(rig)
         new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
         proposals.keep(rig, new)
@@ -288,9 +288,9 @@ of it. What is written there already is overwritten only when you say so"""
         from ..beyond_mocap.library.keep_words import has_words, place
 
         rig = context.object
-        clip, folder = clip_annotation.clip_file(rig)
+        clip, folder = recordings.clip_file(rig)
         try:
-            there = has_words(clip, folder, rig.get(clip_annotation.RATE, 30.0))
+            there = has_words(clip, folder, rig.get(recordings.RATE, 30.0))
             form, target = place(clip, folder)
         except (InputError, OSError):
             return self.execute(context)
@@ -307,11 +307,11 @@ of it. What is written there already is overwritten only when you say so"""
         from ..beyond_mocap.library.keep_words import keep
 
         rig = context.object
-        rows = clip_annotation.said(rig)
-        clip, folder = clip_annotation.clip_file(rig)
-        target = keep(clip, folder, rows, fps=rig[clip_annotation.RATE], overwrite=self.overwrite,
+        rows = recordings.read_words(rig)
+        clip, folder = recordings.clip_file(rig)
+        target = keep(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
                       sources=proposals.sources(rig))
-        clips.say(context.window_manager, clip_annotation.shown(rig), rows)
+        clips.say(context.window_manager, recordings.shown_clip(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of words written to {target}; Build Library takes them in")
 
 

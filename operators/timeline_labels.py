@@ -13,7 +13,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core.settings import active_player, as_setting
 from ..scene.library import recordings
 from ..scene.player import tracks
-from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
+from ..scene.timeline import lanes, lay_strips, strips
 from ..scene.timeline.strip_lines import said, words_of
 from ..scene.timeline.strips import active_clip, subject_clock, subject_name, subject_with_lanes, timeline_subject
 from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
@@ -287,7 +287,7 @@ clip whose armature is active. Strips that are there are replaced"""
     def poll(cls, context):
         """Somebody whose words they are."""
         cls.poll_message_set("Import tracking first: words belong to a player")
-        return bool(clip_annotation.shown(context.object)) or active_player(context.scene.beyond_mocap) is not None
+        return bool(recordings.shown_clip(context.object)) or active_player(context.scene.beyond_mocap) is not None
 
     def do(self, context):
         """Read the file, then lay the strips."""
@@ -295,10 +295,10 @@ clip whose armature is active. Strips that are there are replaced"""
         if len(chosen) != 1:
             raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one text of words")
         settings, rig = context.scene.beyond_mocap, context.object
-        if clip_annotation.shown(rig):
-            motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
+        if recordings.shown_clip(rig):
+            motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
             timeline, whose = read_timeline(chosen[0], motion.fps), rig.name
-            clip_annotation.lay(rig, context.scene, motion, timeline)
+            recordings.lay_words(rig, context.scene, motion, timeline)
         else:
             player = active_player(settings)
             start = float(tracks.read_track(settings, player).times[0])

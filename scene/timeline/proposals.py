@@ -15,8 +15,8 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline
 from ...beyond_mocap.base.errors import InputError
+from ..library.recordings import RATE
 from . import lanes, lay_strips
-from .clip_annotation import RATE
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.proposal import Proposal

@@ -259,7 +259,8 @@ def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="quick") == {"FINISHED"}
     quick = session.made(player.take).take
     assert len(quick.motion) != len(take.motion) and any("cut short" in line for line in quick.warnings)
-    assert freshness.due_update(scene, now + 0.4) is None and freshness.due_update(scene, now + 2.0) == ("Drawn", "whole")
+    assert freshness.due_update(scene, now + 0.4) is None
+    assert freshness.due_update(scene, now + 2.0) == ("Drawn", "whole")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="whole") == {"FINISHED"}
     assert not any("cut short" in line for line in session.made(player.take).take.warnings)
     scene.frame_set(60)
