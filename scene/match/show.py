@@ -15,7 +15,7 @@ from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
-from ..stage import ball, pitch, stage
+from ..stage import ball, stage
 from . import cameras, ours
 from .bodies import Wardrobe
 from .load import Person, Scenery
@@ -115,9 +115,9 @@ def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:
     """Grass, lines, goals and daylight; the "Stage" of single players stands aside while a match is shown."""
     stage.remove(scene)
     home, units, size = ours.part(scene, "pitch"), units_per_metre(scene), (scenery.length, scenery.width)
-    for thing in (pitch.grass(home, units, size), pitch.lines(home, units, size), *pitch.goals(home, units, size[0])):
+    surface = stage.lay_grass(home, units, size), stage.lay_lines(home, units, size)
+    for thing in (*surface, *stage.set_goals(home, units, size[0]), stage.sun(home)):
         ours.mark(thing)
-    ours.mark(stage.sun(home))
     if scene.world is None:
         scene.world = stage.sky()
 

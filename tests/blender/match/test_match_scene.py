@@ -374,12 +374,12 @@ def test_a_gaze_turns_to_the_ball_as_far_as_eyes_turn(room, walk):
 
 @pytest.mark.parametrize("size", [(105.0, 68.0), (90.0, 45.0)])
 def test_lines_and_goals_fit_the_pitch(size):
-    pitch = importlib.import_module(f"{EXTENSION}.scene.stage.pitch")
+    pitch = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
     home = bpy.context.scene.collection
-    lines = pitch.lines(home, 1.0, size)
+    lines = pitch.lay_lines(home, 1.0, size)
     far = np.array([vertex.co for vertex in lines.data.vertices])
     assert np.allclose(np.abs(far[:, :2]).max(axis=0), np.array(size) / 2.0 + 0.06, atol=0.011)
-    made = pitch.goals(home, 1.0, size[0])
+    made = pitch.set_goals(home, 1.0, size[0])
     bpy.context.view_layer.update()
     for goal in made:
         corners = np.array([goal.matrix_world @ vertex.co for vertex in goal.data.vertices])
