@@ -98,7 +98,7 @@ is."""
     busy += ["scene.result.freshness"] if settings().live and room("scene.result.freshness").LIVE.dirty else []
     thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
     busy += ["scene.throws.live"] if thrown and room("scene.throws.live").WATCHER.dirty else []
-    waits = room("scene.core.live").is_waiting(room("scene.timeline.strip_events")._later)
+    waits = room("scene.timeline.strip_events")._later in room("scene.core.live")._timers
     return busy + ["scene.timeline.strip_events"] * waits
 
 
