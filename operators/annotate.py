@@ -48,10 +48,8 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
 
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
-    keys: StringProperty(
-        name="Keys", options={"SKIP_SAVE"},
-        description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts",
-    )
+    keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
+                         description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts")
 
     @classmethod
     def poll(cls, context):

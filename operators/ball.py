@@ -42,13 +42,11 @@ from where it lies"""
     first: IntProperty(name="From", default=1, description="First frame on which the ball may be struck")
     last: IntProperty(name="To", default=1, description="Last frame on which the ball may be struck")
     way: EnumProperty(name="Way", items=WAYS, default="AIR", description="How the ball gets there")
-    bounces: IntProperty(
-        name="Bounces", default=0, min=0, max=5, description="How often it touches the ground before it arrives"
-    )
+    bounces: IntProperty(name="Bounces", default=0, min=0, max=5,
+                         description="How often it touches the ground before it arrives")
     timing: EnumProperty(name="Arrives", items=TIMES, default="FREE", description="When it arrives")
-    seconds: FloatProperty(
-        name="Flight", default=1.0, min=0.05, max=20.0, description="Seconds from the strike to the target"
-    )
+    seconds: FloatProperty(name="Flight", default=1.0, min=0.05, max=20.0,
+                           description="Seconds from the strike to the target")
     arrival: IntProperty(name="Frame", default=50, description="Scene frame on which the ball arrives")
     ball: EnumProperty(name="Ball", items=BALLS, default="football", description="What kind of ball it is")
 
@@ -132,10 +130,8 @@ from the start to see it"""
     bl_label = "Ball to Physics"
 
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
-    ball: EnumProperty(
-        name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
-        description="What kind of ball it is",
-    )
+    ball: EnumProperty(name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
+                       description="What kind of ball it is")
 
     @classmethod
     def poll(cls, context):
@@ -195,10 +191,8 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
 
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
-    threshold: FloatProperty(
-        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
-        description="Metres above which a strike may be; 0: automatic",
-    )
+    threshold: FloatProperty(name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
+                             description="Metres above which a strike may be; 0: automatic")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     markers: BoolProperty(name="Markers", default=True, description="Set markers on the action")
 
@@ -267,10 +261,8 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
     first: IntProperty(name="From", default=1, description="Frame from which on it is carried")
     last: IntProperty(name="To", default=30, description="Frame on which it is let go")
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
-    settle: IntProperty(
-        name="Settle", default=4, min=1, max=1000,
-        description="Frames within which the ball comes to where it is carried",
-    )
+    settle: IntProperty(name="Settle", default=4, min=1, max=1000,
+                        description="Frames within which the ball comes to where it is carried")
 
     @classmethod
     def poll(cls, context):
@@ -342,9 +334,8 @@ its touches proposals for key moments"""
     def apply(self, scene, solved):
         """The ball, and the list of touches."""
         tracked.write(scene, solved)
-        self.report(
-            {"INFO"}, f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean"
-        )
+        self.report({"INFO"},
+                    f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean")
 
 
 class BEYOND_MOCAP_OT_accept_touches(Verb, bpy.types.Operator):
@@ -354,9 +345,8 @@ none is added"""
     bl_idname = "beyond_mocap.accept_touches"
     bl_label = "Accept Touches"
 
-    active: BoolProperty(
-        name="Active Player", default=False, options={"SKIP_SAVE"}, description="Only those of the active player"
-    )
+    active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
+                         description="Only those of the active player")
 
     @classmethod
     def poll(cls, context):
@@ -371,9 +361,8 @@ none is added"""
             raise InputError("player", "none in the list", "one", "import tracking in step 2")
         count, told = tracked.accept(context, player.name if self.active else "")
         if not count and not told:
-            raise InputError(
-                "touches", "none is ticked that has words and a player of the list", "one", "tick some in the list"
-            )
+            raise InputError("touches", "none is ticked that has words and a player of the list", "one",
+                             "tick some in the list")
         for line in told[:5]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{count} key moments added")

@@ -32,10 +32,8 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
     filename_ext = ".bvh"
 
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
-    unit: FloatProperty(
-        name="Metres per unit", default=0.0, min=0.0, precision=5,
-        description="Size of one unit of the file in metres; 0 guesses it from the height of the hips",
-    )
+    unit: FloatProperty(name="Metres per unit", default=0.0, min=0.0, precision=5,
+                        description="Size of one unit of the file in metres; 0 guesses it from the height of the hips")
     reuse: BoolProperty(
         name="Onto Selected Armature", default=False,
         description="Add the clips' actions to the active armature, if its bones are the same, and make no new one",
@@ -180,9 +178,8 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
     kind = "assets"
 
     which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
-    apart: BoolProperty(
-        name="As a File", description="Write a .blend of their own and leave this file as it is", options={"SKIP_SAVE"}
-    )
+    apart: BoolProperty(name="As a File", description="Write a .blend of their own and leave this file as it is",
+                        options={"SKIP_SAVE"})
     overwrite: BoolProperty(name="Overwrite", description="Replace a file that is there", options={"SKIP_SAVE"})
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}, description="The .blend to write")
     filter_glob: StringProperty(default="*.blend", options={"HIDDEN"})
@@ -208,9 +205,8 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         chosen = clips.active(context.window_manager)
         wanted = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
         if not wanted:
-            raise InputError(
-                "assets", "no clip in the list", "clips of the library", "press Build Library or List Clips"
-            )
+            raise InputError("assets", "no clip in the list", "clips of the library",
+                             "press Build Library or List Clips")
         folder = recordings.folder_of(settings)
         files = tuple((row.path, *recordings.file_of(settings, row.path), row.figures) for row in wanted)
         return Order(folder, files, ())
@@ -293,9 +289,8 @@ def _playing(context) -> list[bpy.types.Object]:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
         if rig.beyond_mocap_ride.on:
-            raise InputError(
-                rig.name, "its motion still rides a path", "a motion of its own", "press Keep in Path Editing first"
-            )
+            raise InputError(rig.name, "its motion still rides a path", "a motion of its own",
+                             "press Keep in Path Editing first")
     return rigs
 
 

@@ -34,9 +34,8 @@ class FolderVerb(BackgroundVerb):
 class ClipVerb(Verb):
     """A verb about one clip of the list: the one that it is told, else the one chosen there."""
 
-    path: StringProperty(
-        name="Clip", options={"SKIP_SAVE"}, description="Below the library's folder; empty: the one chosen in the list"
-    )
+    path: StringProperty(name="Clip", options={"SKIP_SAVE"},
+                         description="Below the library's folder; empty: the one chosen in the list")
     dressed: BoolProperty(name="Body", default=True, description="With a low-poly body, not only bones")
 
     @classmethod
@@ -88,9 +87,8 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     job = None
     notes = ()
 
-    rebuild: BoolProperty(
-        name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
-    )
+    rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept",
+                          options={"SKIP_SAVE"})
 
     def order(self, context):
         """Folder and unit."""
@@ -274,10 +272,8 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         if chosen:
             settings.library_folder = as_setting(chosen)
         elif not os.path.isdir(absolute(settings.library_folder)) and not clips.relink_library(context.scene):
-            raise InputError(
-                absolute(settings.library_folder), "no such folder, nor one like it beside this file",
-                "the library's folder", "choose it in Relink Library",
-            )
+            raise InputError(absolute(settings.library_folder), "no such folder, nor one like it beside this file",
+                             "the library's folder", "choose it in Relink Library")
         clips.check_folder(context.scene)
         self.report({"INFO"}, f"library: {absolute(settings.library_folder)}")
 

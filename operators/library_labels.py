@@ -61,19 +61,15 @@ yours to add"""
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"
 
-    least: FloatProperty(
-        name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
-        description="Proposals that are less sure than this are left out",
-    )
+    least: FloatProperty(name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
+                         description="Proposals that are less sure than this are left out")
     replace: BoolProperty(
         name="Replace", default=True,
         description="In place of the strips that are there; else they stay, and proposals are put beside them",
     )
 
-    review: BoolProperty(
-        name="One by One", default=False, options={"SKIP_SAVE"},
-        description="Only list them: each becomes a strip or key moment when it is accepted",
-    )
+    review: BoolProperty(name="One by One", default=False, options={"SKIP_SAVE"},
+                         description="Only list them: each becomes a strip or key moment when it is accepted")
 
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
@@ -154,10 +150,8 @@ class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
     bl_label = "Judge Proposal"
 
     what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="What becomes of it")
-    index: IntProperty(
-        name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
-        description="Its place in the list; -1: the chosen one",
-    )
+    index: IntProperty(name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
+                       description="Its place in the list; -1: the chosen one")
 
     @classmethod
     def description(cls, _context, properties):
@@ -278,9 +272,8 @@ of it. What is written there already is overwritten only when you say so"""
     bl_label = "Save Words"
     bl_options = {"REGISTER"}
 
-    overwrite: BoolProperty(
-        name="Overwrite", description="Replace what is written about this clip", options={"SKIP_SAVE"}
-    )
+    overwrite: BoolProperty(name="Overwrite", description="Replace what is written about this clip",
+                            options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
         """Ask before words are overwritten."""
@@ -333,9 +326,8 @@ same acts in others. What is learned is kept in a file, which serves any library
     bl_label = "Learn from Words"
     kind = "learning"
 
-    out: StringProperty(
-        name="File", subtype="FILE_PATH", options={"SKIP_SAVE"}, description="Where it is kept; empty: in the cache"
-    )
+    out: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
+                        description="Where it is kept; empty: in the cache")
 
     def order(self, context):
         """Folder, unit and where to."""

@@ -58,10 +58,8 @@ The first minute is chosen"""
     bl_label = "Read Match"
     kind = "match file"
 
-    filepath: StringProperty(
-        name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
-        description="A tracking file; empty: the one that is chosen in the panel",
-    )
+    filepath: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
+                             description="A tracking file; empty: the one that is chosen in the panel")
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -163,9 +161,8 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
         """Make it in a process of its own, then expand it."""
         arguments, wanted, library = asked
         notes = child.run(arguments, lambda done, text: progress(MAKING * done, text), cancelled)
-        shown = load.scenery(
-            wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text), cancelled
-        )
+        shown = load.scenery(wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text),
+                             cancelled)
         return wanted, shown, notes
 
 

@@ -95,17 +95,15 @@ def add_player(context) -> None:
     free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
     if free and not any(row.body == body for row in settings.players):
         place, facing = standing(scene, body)
-        row = order.add_player(
-            context, body.name if not _taken(settings, body.name) else order.free_name(settings), place, facing
-        )
+        row = order.add_player(context, body.name if not _taken(settings, body.name) else order.free_name(settings),
+                               place, facing)
         row.body = body
         return
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
-    order.add_player(
-        context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)), angle + math.pi
-    )
+    order.add_player(context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)),
+                     angle + math.pi)
 
 
 def standing(scene, body) -> tuple[tuple[float, float], float]:
@@ -146,10 +144,8 @@ flight leaves one body at its strike and arrives at the next one at his"""
     bl_label = "Make Scene"
     kind = "passes"
 
-    live: BoolProperty(
-        name="Live", options={"HIDDEN", "SKIP_SAVE"},
-        description="Whether an edit asked for it: what is wrong is told in the panel",
-    )
+    live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
+                       description="Whether an edit asked for it: what is wrong is told in the panel")
 
     @classmethod
     def poll(cls, context):
@@ -173,9 +169,8 @@ flight leaves one body at its strike and arrives at the next one at his"""
         """Bodies and ball; what is shown is what was ordered."""
         rows = {row.name for row in scene.beyond_mocap_passes.players}
         if missing := [one.name for one in result.passes.players if one.name not in rows]:
-            raise InputError(
-                "players", f"{missing[0]} is gone from the list meanwhile", "the same players", "press Make Scene again"
-            )
+            raise InputError("players", f"{missing[0]} is gone from the list meanwhile", "the same players",
+                             "press Make Scene again")
         make.show(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
@@ -259,6 +254,5 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
         missing = examples.left_out(context.scene.beyond_mocap_passes)
-        self.report(
-            {"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing)))
-        )
+        self.report({"WARNING" if missing else "INFO"},
+                    ", ".join(filter(None, (f"written to {self.filepath}", missing))))

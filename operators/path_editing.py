@@ -61,9 +61,8 @@ back"""
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
         riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
         if drawn is None and len(riding) == len(chosen):
-            raise InputError(
-                f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave"
-            )
+            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not",
+                             "edit its curve, or press Leave")
         begun, used = [], drawn
         try:
             for body, _ in riding if drawn is not None else ():
@@ -91,9 +90,8 @@ back"""
 def bodies(context) -> list[bpy.types.Object]:
     """The armatures that are meant: the active one first, and the other selected ones."""
     active = context.view_layer.objects.active
-    return sorted(
-        (thing for thing in context.selected_objects if thing.type == "ARMATURE"), key=lambda thing: thing != active
-    )
+    return sorted((thing for thing in context.selected_objects if thing.type == "ARMATURE"),
+                  key=lambda thing: thing != active)
 
 
 class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
@@ -146,18 +144,12 @@ as little as it takes. Of two or more selected riders only those give way; other
     bl_idname = "beyond_mocap.path_apart"
     bl_label = "Keep Apart"
 
-    distance: FloatProperty(
-        name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
-        description="Metres between the middles of two bodies at least",
-    )
-    delay: FloatProperty(
-        name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds that a rider may begin later",
-    )
-    detour: FloatProperty(
-        name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
-        description="Metres that a rider may leave its path to the side",
-    )
+    distance: FloatProperty(name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
+                            description="Metres between the middles of two bodies at least")
+    delay: FloatProperty(name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2,
+                         unit="TIME_ABSOLUTE", description="Seconds that a rider may begin later")
+    detour: FloatProperty(name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
+                          description="Metres that a rider may leave its path to the side")
     clear: BoolProperty(name="Clear", description="Only take back the waits and detours of before")
 
     @classmethod
@@ -245,10 +237,8 @@ looks"""
     bl_label = "Nudge Points"
 
     direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
-    step: FloatProperty(
-        name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
-        description="Metres to move; 0: the step that is set in the panel Path Editing",
-    )
+    step: FloatProperty(name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
+                        description="Metres to move; 0: the step that is set in the panel Path Editing")
 
     @classmethod
     def poll(cls, context):
@@ -267,9 +257,7 @@ looks"""
     def do(self, context):
         """Blender's own move, since it knows what a handle does to its neighbour."""
         step = (self.step or context.scene.beyond_mocap.nudge_step) * units_per_metre(context.scene)
-        moved = bpy.ops.transform.translate(
-            "EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]], orient_type="GLOBAL", mirror=False,
-            use_proportional_edit=False, snap=False,
-        )
+        moved = bpy.ops.transform.translate("EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]],
+                                            orient_type="GLOBAL", mirror=False, use_proportional_edit=False, snap=False)
         if moved != {"FINISHED"}:
             raise InputError("nudge", "no control point selected", "one or more", "click on a point first")

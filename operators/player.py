@@ -150,9 +150,8 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.choose_player"
     bl_label = "Show Player's Strips"
 
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="The player's name; empty is the active one"
-    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"},
+                           description="The player's name; empty is the active one")
 
     @classmethod
     def poll(cls, context):

@@ -17,9 +17,8 @@ from .verb import Verb
 class ResultVerb(Verb):
     """A verb about the results of one player, or of all that are ticked."""
 
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="Whose result; empty: of all ticked players",
-    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"},
+                           description="Whose result; empty: of all ticked players")
 
     def chosen(self, context) -> list:
         """The players in question."""

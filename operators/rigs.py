@@ -136,9 +136,8 @@ on the ground. What the rig played before is kept as an action"""
     bl_idname = "beyond_mocap.bake_to_rig"
     bl_label = "Bake to Rig"
 
-    targets: EnumProperty(
-        name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"}, description="Which rigs get the motion"
-    )
+    targets: EnumProperty(name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"},
+                          description="Which rigs get the motion")
 
     @classmethod
     def poll(cls, context):

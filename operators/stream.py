@@ -86,9 +86,8 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.stream_keep"
     bl_label = "Keep Recording"
 
-    seconds: FloatProperty(
-        name="Seconds", default=10.0, min=0.1, max=20.0, description="How much of what has just been seen is kept"
-    )
+    seconds: FloatProperty(name="Seconds", default=10.0, min=0.1, max=20.0,
+                           description="How much of what has just been seen is kept")
 
     def do(self, context):
         """Read the ring, write an action."""

@@ -86,9 +86,7 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
         name="Finish Early", options={"SKIP_SAVE"},
         description="Come to an end with the best that has been found so far; players that wait are left as they are",
     )
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="Only take this player out of the queue",
-    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only take this player out of the queue")
 
     @classmethod
     def description(cls, _context, properties):
@@ -119,13 +117,10 @@ of an accepted result, of a selected span of words, or the preview range. All el
     bl_idname = "beyond_mocap.resynthesize_stretch"
     bl_label = "Resynthesize Stretch"
 
-    start: FloatProperty(
-        name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE", description="Second on the track's clock",
-    )
-    end: FloatProperty(
-        name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
-        description="Second on the track's clock; 0: as selected",
-    )
+    start: FloatProperty(name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
+                         description="Second on the track's clock")
+    end: FloatProperty(name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
+                       description="Second on the track's clock; 0: as selected")
 
     @classmethod
     def poll(cls, context):

@@ -34,9 +34,8 @@ class AtTarget(BackgroundVerb):
         """Armature, ball and figures."""
         body = scene.objects.get(result.order.body)
         if body is None or body.type != "ARMATURE":
-            raise InputError(
-                f"armature {result.order.body}", "it is gone meanwhile", "the same armature", "press again"
-            )
+            raise InputError(f"armature {result.order.body}", "it is gone meanwhile", "the same armature",
+                             "press again")
         shown.show(scene, body, result)
         for line in body.beyond_mocap_throw.told.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")

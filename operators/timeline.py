@@ -136,18 +136,16 @@ goes to the next. Shift-click also brings the body into view"""
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"
 
-    seconds: FloatProperty(
-        name="Seconds", options={"SKIP_SAVE"}, description="Second on the tracking file's clock to go to"
-    )
+    seconds: FloatProperty(name="Seconds", options={"SKIP_SAVE"},
+                           description="Second on the tracking file's clock to go to")
     stops: StringProperty(
         name="Stops", options={"SKIP_SAVE"},
         description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to "
         "the first"
     )
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Whose body; empty: the active player's")
-    frame_view: BoolProperty(
-        name="Bring into View", options={"SKIP_SAVE"}, description="Move the 3D views so that the body is seen"
-    )
+    frame_view: BoolProperty(name="Bring into View", options={"SKIP_SAVE"},
+                             description="Move the 3D views so that the body is seen")
 
     def invoke(self, context, event):
         """As the button was pressed."""

@@ -32,10 +32,8 @@ playhead on"""
         name="From", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
         description="Seconds on the track's clock; where From and To are equal, the preview range or the playhead",
     )
-    end: FloatProperty(
-        name="To", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
-        description="Seconds on the track's clock",
-    )
+    end: FloatProperty(name="To", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
+                       description="Seconds on the track's clock")
 
     def invoke(self, context, _event):
         """Ask for the words."""

@@ -61,10 +61,9 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
     bl_idname = "beyond_mocap.track_object"
     bl_label = "Track from Object"
 
-    for_active: bpy.props.BoolProperty(
-        name="Active Player", description="Give it to the active player in the list instead of adding one",
-        options={"SKIP_SAVE"},
-    )
+    for_active: bpy.props.BoolProperty(name="Active Player",
+                                       description="Give it to the active player in the list instead of adding one",
+                                       options={"SKIP_SAVE"})
 
     @classmethod
     def poll(cls, context):
@@ -96,13 +95,10 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
 
-    speed: bpy.props.FloatProperty(
-        name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2, description="Metres per second; 0: a stop"
-    )
-    wait: bpy.props.FloatProperty(
-        name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds that are waited at a stop",
-    )
+    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2,
+                                   description="Metres per second; 0: a stop")
+    wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
+                                  description="Seconds that are waited at a stop")
 
     @classmethod
     def poll(cls, context):
@@ -149,10 +145,8 @@ with G; time and hold stand in the list of pins"""
         name="At", items=(("BODY", "Body", "Where the part is now"), ("CURSOR", "3D Cursor", "At the 3D cursor")),
         description="Where the pin is made",
     )
-    hold: bpy.props.FloatProperty(
-        name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds for which it stays there"
-    )
+    hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
+                                  description="Seconds for which it stays there")
 
     @classmethod
     def poll(cls, context):

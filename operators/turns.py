@@ -230,9 +230,8 @@ class TurnsVerb(Verb):
             self.tell(f"{entry.player} keeps changing, its take is dropped; press {self.bl_label} again", "WARNING")
         else:
             self.tell(f"{entry.player} has changed meanwhile and is made again")
-            queue.add(queue.Entry(
-                entry.scene, player.name, entry.how, order=None, fingerprint="", tries=entry.tries + 1,
-            ))
+            queue.add(queue.Entry(entry.scene, player.name, entry.how, order=None, fingerprint="",
+                                  tries=entry.tries + 1))
 
     def over(self, context):
         """Nothing waits any more."""

@@ -59,9 +59,8 @@ def tracked(panel, layout, context) -> None:
         table(layout, settings.solved.splitlines())
     if not len(settings.touches):
         return
-    layout.template_list(
-        "BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch", rows=5
-    )
+    layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
+                         rows=5)
     if touch := active_row(settings.touches, settings.active_touch):
         layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
         row = layout.row(align=True)
@@ -103,13 +102,10 @@ def hits(layout, context) -> None:
 def carried(layout, context) -> None:
     """Who carries the ball and when."""
     settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
-    layout.label(
-        text=ball.name if ball is not None else "No ball: select one", icon="SPHERE" if ball is not None else "INFO"
-    )
-    layout.label(
-        text=body.name if body is not None else "No armature: select one",
-        icon="ARMATURE_DATA" if body is not None else "INFO",
-    )
+    layout.label(text=ball.name if ball is not None else "No ball: select one",
+                 icon="SPHERE" if ball is not None else "INFO")
+    layout.label(text=body.name if body is not None else "No armature: select one",
+                 icon="ARMATURE_DATA" if body is not None else "INFO")
     row = layout.row(align=True)
     row.prop(settings, "hold_part", text="")
     row.prop(settings, "hold_side", text="")
@@ -350,10 +346,8 @@ def choices(layout, settings) -> None:
 def weights(layout, settings) -> None:
     """Of eq. 1 and 2."""
     column = split(layout)
-    for title, names in (
-        ("Two Strikes Compared", ("speed", "vectors", "times")),
-        ("Two Poses Compared", ("position", "velocity", "bones")),
-    ):
+    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")),
+                         ("Two Poses Compared", ("position", "velocity", "bones"))):
         column.label(text=title)
         for name in names:
             column.prop(settings.weights, name)

@@ -36,9 +36,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
         row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
         row = layout.row()
-        row.template_list(
-            "BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player", rows=3
-        )
+        row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player",
+                          rows=3)
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
         if any(player.dot is None for player in settings.players):
             layout.operator("beyond_mocap.place_players", icon="NLA")

@@ -17,9 +17,8 @@ def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """A row for every key of the extension, under the name of the editor in which it works."""
     configurations = context.window_manager.keyconfigs
     for keymap in _with_our_keys(configurations.addon):
-        own = configurations.user.keymaps.find(
-            keymap.name, space_type=keymap.space_type, region_type=keymap.region_type
-        )
+        own = configurations.user.keymaps.find(keymap.name, space_type=keymap.space_type,
+                                               region_type=keymap.region_type)
         if own is None:
             continue
         column = layout.column()

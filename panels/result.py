@@ -119,9 +119,8 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         if body:
             for line in player.moments.splitlines():
                 text, second, status = (*line.split("\t"), "", "")[:3]
-                self.jump(
-                    body, player, text, second, "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC"
-                )
+                self.jump(body, player, text, second,
+                          "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
         header, body = layout.panel("beyond_mocap_quality_why")
         header.label(text="Why This Clip")
         if body:

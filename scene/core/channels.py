@@ -21,10 +21,8 @@ FIGURES = {  # what else a key has, and how foreach_get gives it
 }
 
 
-def animate(
-    target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
-    generated: bool = False,
-):
+def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
+            generated: bool = False):
     """Give `target` a new action `name` and return it.
 
     frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for

@@ -48,17 +48,12 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 
     name: StringProperty(name="Name", update=show_on_dot, description="What this player is called")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
-    tracking_file: StringProperty(
-        name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="The file with this player's positions",
-    )
-    metadata_file: StringProperty(
-        name="Metadata", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="The provider's second file, where there is one (pitch, teams)",
-    )
-    feed_id: StringProperty(
-        name="ID in the feed", description="Which player of the tracking file this is; empty for a file of one player"
-    )
+    tracking_file: StringProperty(name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+                                  description="The file with this player's positions")
+    metadata_file: StringProperty(name="Metadata", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+                                  description="The provider's second file, where there is one (pitch, teams)")
+    feed_id: StringProperty(name="ID in the feed",
+                            description="Which player of the tracking file this is; empty for a file of one player")
     provider: StringProperty(name="Provider", description="Whose form the tracking file has; empty guesses it")
     drawn_track: PointerProperty(
         name="Drawn Track", type=bpy.types.Object, poll=is_track,
@@ -74,18 +69,12 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
         name="Text", type=bpy.types.Text,
         description="A text of this file with the words; it counts more than the file on disk",
     )
-    shirt: FloatVectorProperty(
-        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-        description="Colour of the player's shirt", update=show_on_dot,
-    )
-    dot: PointerProperty(
-        name="Dot", type=bpy.types.Object,
-        description="The Empty that runs along the track and carries the strips of the player's words",
-    )
-    body: PointerProperty(
-        name="Body", type=bpy.types.Object, poll=is_armature,
-        description="The armature that this player's takes are shown on; made where it is missing",
-    )
+    shirt: FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
+                               description="Colour of the player's shirt", update=show_on_dot)
+    dot: PointerProperty(name="Dot", type=bpy.types.Object,
+                         description="The Empty that runs along the track and carries the strips of the player's words")
+    body: PointerProperty(name="Body", type=bpy.types.Object, poll=is_armature,
+                          description="The armature that this player's takes are shown on; made where it is missing")
     rig: PointerProperty(
         name="Rig", type=bpy.types.Object, poll=is_armature,
         description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is "
@@ -93,12 +82,10 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
-    moments: StringProperty(
-        name="Key moments", options={"HIDDEN"}, description="A line for each key moment of the newest take"
-    )
-    warnings: StringProperty(
-        name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take"
-    )
+    moments: StringProperty(name="Key moments", options={"HIDDEN"},
+                            description="A line for each key moment of the newest take")
+    warnings: StringProperty(name="Warnings", options={"HIDDEN"},
+                             description="Lines about what to look at in the newest take")
     result: PointerProperty(type=BeyondMocapResult, description="What became of the newest take")
 
 
@@ -109,10 +96,8 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
 
     attached_to = ("Scene.beyond_mocap",)
 
-    version: IntProperty(
-        name="Version", options={"HIDDEN"},
-        description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet",
-    )
+    version: IntProperty(name="Version", options={"HIDDEN"},
+                         description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet")
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},

@@ -136,9 +136,8 @@ def label(person: Person) -> str:
     return " ".join(part for part in (f"{person.team.capitalize()}{number}", known) if part)
 
 
-def number_shapes(
-    number: int, body: "BodyMesh", skeleton: Skeleton, example: Motion
-) -> tuple[np.ndarray, list[tuple[int, ...]], np.ndarray, np.ndarray]:
+def number_shapes(number: int, body: "BodyMesh", skeleton: Skeleton,
+                  example: Motion) -> tuple[np.ndarray, list[tuple[int, ...]], np.ndarray, np.ndarray]:
     """Vertices (V, 3) m in the rest pose, faces, joints (V, 6) and weights (V, 6) of `number` on back and chest."""
     from ...beyond_mocap.appearance.shirt_number import on_shirt  # brings scipy, which is slow to import
 

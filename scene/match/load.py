@@ -63,9 +63,8 @@ class Wanted:
     build: dict = field(default_factory=dict)
 
 
-def scenery(
-    wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None], cancelled: Callable[[], bool]
-) -> tuple["Library", Scenery, tuple[str, ...]]:
+def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None],
+            cancelled: Callable[[], bool]) -> tuple["Library", Scenery, tuple[str, ...]]:
     """The library (built where it is None), everybody's motion, and lines about whoever cannot be shown.
 
     InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
@@ -75,16 +74,13 @@ def scenery(
 
     state = _state(wanted.folder)
     if library is None:
-        library = build(
-            wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled,
-            progress=lambda done, text: progress(LIBRARYS_SHARE * done, text),
-        )
+        library = build(wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled, progress=lambda done,
+                        text: progress(LIBRARYS_SHARE * done, text))
     start, end = _span(wanted, state)
     course = Path(wanted.folder) / "ball.csv"
     ball = read_ball(course) if course.is_file() else None
-    people, lines = _people(
-        wanted, state, library, ball=ball, span=(start, end), progress=progress, cancelled=cancelled,
-    )
+    people, lines = _people(wanted, state, library, ball=ball, span=(start, end), progress=progress,
+                            cancelled=cancelled)
     if not people:
         found = f"nobody is there from {told_time(start)} to {told_time(end)} s"
         raise InputError(wanted.folder, found, "a time of play", *lines[:1])

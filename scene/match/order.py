@@ -43,9 +43,8 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
     ticked = ticked if len(ticked) < len(match.players) else ()
     start, end = float(typed(match.start)), float(typed(match.end))
     unit, build = settings.library_unit or None, preferences.for_build(library)
-    return Wanted(
-        folder, start, end, players=ticked, colours=colours_of(match), library=library, unit=unit, build=build,
-    )
+    return Wanted(folder, start, end, players=ticked, colours=colours_of(match), library=library, unit=unit,
+                  build=build)
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:

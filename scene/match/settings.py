@@ -72,18 +72,15 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         description="Where everybody's motion is kept, some megabytes a match. Empty: one for each stretch and choice, "
         "beside the saved file or the tracking",
     )
-    home_colour: FloatVectorProperty(
-        name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["home"]),
-        description="Colour of the home team's shirts", update=show_colours,
-    )
-    away_colour: FloatVectorProperty(
-        name="Away Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["away"]),
-        description="Colour of the away team's shirts", update=show_colours,
-    )
-    referee_colour: FloatVectorProperty(
-        name="Referees", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["referee"]),
-        description="Colour of the referees' shirts", update=show_colours,
-    )
+    home_colour: FloatVectorProperty(name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0,
+                                     default=linear(USUAL["home"]), description="Colour of the home team's shirts",
+                                     update=show_colours)
+    away_colour: FloatVectorProperty(name="Away Shirts", subtype="COLOR", size=3, min=0.0, max=1.0,
+                                     default=linear(USUAL["away"]), description="Colour of the away team's shirts",
+                                     update=show_colours)
+    referee_colour: FloatVectorProperty(name="Referees", subtype="COLOR", size=3, min=0.0, max=1.0,
+                                        default=linear(USUAL["referee"]), description="Colour of the referees' shirts",
+                                        update=show_colours)
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Who is in the match")
     active: IntProperty(name="Player", min=0, description="The player that is chosen in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="The tracking file that the list was read from")

@@ -60,21 +60,17 @@ def frame_of(scene: bpy.types.Scene, start: float, first: int, seconds: float) -
     return first + (seconds - start) * frames_per_second(scene)
 
 
-def bake_person(
-    scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Object], start: float, first: int, last: int
-) -> None:
+def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Object], start: float, first: int,
+                last: int) -> None:
     """Let a person's armature (the first of `worn`) move as he does, and everything he wears be hidden outside his
     stretches; `start` s is scene frame `first`, and `last` the last frame that is shown."""
     who = worn[0]
-    parts = [
-        action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins, motion in person.motions
-    ]
+    parts = [action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins,
+             motion in person.motions]
     frames = np.concatenate([frames for frames, _ in parts])
     kept = np.concatenate([[True], np.diff(frames) > 0])  # stretches may share a frame
-    curves = {
-        path: (group, np.concatenate([curves[path][1] for _, curves in parts])[kept])
-        for path, (group, _) in parts[0][1].items()
-    }
+    curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[kept]) for path,
+              (group, _) in parts[0][1].items()}
     done = channels.animate(who, f"{who.name} match", frames[kept], curves)
     done[action.PLACED] = [number for row in who.matrix_world for number in row]
     ours.mark(done)

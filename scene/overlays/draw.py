@@ -322,9 +322,8 @@ def _write_line(x: float, y: float, text: str, size: float) -> None:
     blf.draw(FONT, text)
 
 
-WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=(
-    (bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"), (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL"),
-))
+WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
+                                                                (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
 ROWS = {
     "track": _scale("Off the track", colours.ROOT_STOPS, 100.0, "cm"),
     "footprints": _scale("Standing foot slides", colours.SLIDE_STOPS, 1000.0, "mm"),

@@ -121,21 +121,13 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
         "moments": _moments(met, take),
         "speed": _speed(ground, figures),
     }
-    return Prepared(
-        start=float(take.start_time),
-        fps=float(take.motion.fps),
-        count=len(take.motion),
-        meshes={name: found for name, found in meshes.items() if found},
-        pelvis=positions[:, view.played.body.hips],
-        toes=view.played.feet[:, :, 1].astype(np.float32),
-        stands=view.played.contacts,
-        figures=positions,
-        pairs=pairs,
-        pair_colours=_pair_colours(skeleton.names, pairs),
-        seams=tuple(int(seam) for seam in take.seams),
-        pieces=_pieces(plan, take, library, view.played.pelvis),
-        labels=tuple(_label(strike) for strike in met),
-    )
+    return Prepared(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
+                    meshes={name: found for name, found in meshes.items() if found},
+                    pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
+                    stands=view.played.contacts, figures=positions, pairs=pairs,
+                    pair_colours=_pair_colours(skeleton.names, pairs), seams=tuple(int(seam) for seam in take.seams),
+                    pieces=_pieces(plan, take, library, view.played.pelvis),
+                    labels=tuple(_label(strike) for strike in met))
 
 
 def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
@@ -156,10 +148,8 @@ def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
     slide = colours.scaled(np.array([p.slide for p in found]), colours.SLIDE_STOPS, 0.8)
     sides = np.array([(*colours.LEFT, 1.0), (*colours.RIGHT, 1.0)], np.float32)[side]
     edge[:, 2] = SOLE_EDGE
-    return (
-        Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
-        Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0),
-    )
+    return (Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
+            Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0))
 
 
 def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
@@ -219,10 +209,8 @@ def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.nd
     """The pieces, with the reasons of the search where its library is known."""
     last = len(pelvis) - 1
     return tuple(
-        Piece(
-            take.start_time + start, take.start_time + end,
-            (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines,
-        )  # fmt: skip
+        Piece(take.start_time + start, take.start_time + end,
+              (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
         for start, end, name, lines in _told(plan, take, library)
     )
 

@@ -164,7 +164,5 @@ def _actions(body: bpy.types.Object):
         yield from (strip.action for track in data.nla_tracks for strip in track.strips if strip.action)
 
 
-WATCHER = Watcher(
-    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed,
-    ends=clear,
-)
+WATCHER = Watcher(name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed,
+                  loaded=_file_changed, ends=clear)

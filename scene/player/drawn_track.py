@@ -193,11 +193,9 @@ def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
     if ends is None:
         return None
     frames = np.arange(ends[0], ends[1] + 1, dtype=float)
-    columns = [
-        channels.sample(curves["location", axis], frames) if ("location", axis) in curves
-        else np.full(len(frames), moving.location[axis])
-        for axis in range(3)
-    ]
+    columns = [channels.sample(curves["location", axis], frames) if ("location", axis) in curves
+               else np.full(len(frames), moving.location[axis])
+               for axis in range(3)]
     return frames, np.stack(columns, axis=1)
 
 

@@ -26,17 +26,13 @@ AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
 class BeyondMocapPin(bpy.types.PropertyGroup):
     """One pin of a player; its name is the part's."""
 
-    target: PointerProperty(
-        name="Place", type=bpy.types.Object, description="The Empty that says where; move it with G"
-    )
+    target: PointerProperty(name="Place", type=bpy.types.Object,
+                            description="The Empty that says where; move it with G")
     part: EnumProperty(name="Part", items=PARTS, description="What is held there")
-    time: FloatProperty(
-        name="Time", unit="TIME_ABSOLUTE", precision=2, description="Second on the track's clock at which it is there"
-    )
-    hold: FloatProperty(
-        name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
-        description="Seconds for which it stays there; 0: a moment",
-    )
+    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=2,
+                        description="Second on the track's clock at which it is there")
+    hold: FloatProperty(name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
+                        description="Seconds for which it stays there; 0: a moment")
 
 
 def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
@@ -89,9 +85,8 @@ def remove_all(player) -> None:
 def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
     """Where the player's part is on the present frame, or AHEAD metres before his face: (3,) metres in the world."""
     if player.body is None:
-        raise InputError(
-            f"player {player.name}", "no body", "a body to pin", "Synthesize first, or pin at the 3D cursor"
-        )
+        raise InputError(f"player {player.name}", "no body", "a body to pin",
+                         "Synthesize first, or pin at the 3D cursor")
     skeleton = armature.skeleton_of(player.body, context.scene)
     body = identify(skeleton)
     sides = {"left": body.left, "right": body.right}

@@ -40,9 +40,8 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
         target[MARK] = True
         order.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
-        body.create(
-            target, order.name, tuple(order.shirt), collection=room, scene=scene, example=take.motion,
-        )[MARK] = True
+        body.create(target, order.name, tuple(order.shirt), collection=room, scene=scene,
+                    example=take.motion)[MARK] = True
     channels.discard(target, MARK)
     start = frame_at(scene, take.start_time)
     action.write(target, take.motion, scene, start, f"{order.name} take", generated=True)[MARK] = True

@@ -336,9 +336,8 @@ def forget_edits() -> None:
     _edits.update(looked=0.0, quick={}, begun={})
 
 
-WATCHER = Watcher(
-    name="What is out of date", changed=_after_change, restored=_after_undo, loaded=_nothing_runs, look=_tick, ends=_end
-)
+WATCHER = Watcher(name="What is out of date", changed=_after_change, restored=_after_undo, loaded=_nothing_runs,
+                  look=_tick, ends=_end)
 LIVE = Watcher(name="Live", matters=MATTERS, settle=update_due, ends=forget_edits)
 
 

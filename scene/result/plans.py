@@ -25,19 +25,13 @@ def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     return players
 
 
-def plan_of(
-    settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False
-) -> tuple[Plan, tuple[str, ...]]:
+def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
+            still: bool = False) -> tuple[Plan, tuple[str, ...]]:
     """The plan of one player, and what in the track asks for attention; still: see `drawn_track.read`."""
     track, found = clean(read_track(settings, player, still))
-    plan = Plan(
-        track=track,
-        timeline=timeline_of(player, settings.rate, track),
-        library=absolute(settings.library_folder),
-        pins=pins.read(player.id_data, player),
-        **property_values(Plan, settings, "synthesis"),
-        **property_values(Plan, player, "player"),
-    )
+    plan = Plan(track=track, timeline=timeline_of(player, settings.rate, track),
+                library=absolute(settings.library_folder), pins=pins.read(player.id_data, player),
+                **property_values(Plan, settings, "synthesis"), **property_values(Plan, player, "player"))
     return plan, found.warnings
 
 

@@ -69,11 +69,9 @@ def quality_lines(report: Mapping) -> str:
         met = target.met(value, table) if target else None
         least, most = target.bounds(table) if target else (None, None)
         shown = [form.format(_shown(limit, factor)) for limit in (least, most) if limit is not None]
-        aim = (
-            ("≥ " if (least is not None) == (factor > 0) else "≤ ") + shown[0]
-            if len(shown) == 1
-            else " .. ".join(shown)
-        )
+        aim = (("≥ " if (least is not None) == (factor > 0) else "≤ ") + shown[0]
+               if len(shown) == 1
+               else " .. ".join(shown))
         status = "" if met is None else ("met" if met else "missed")
         lines.append("\t".join((f"{name}: {form.format(_shown(value, factor))}{unit}", aim, status)))
     return "\n".join(lines)

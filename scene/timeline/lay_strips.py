@@ -31,9 +31,8 @@ from .lanes import (
 from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
 
 
-def write(
-    target: bpy.types.Object, timeline: Timeline, clock: Clock, extent: tuple[float, float] | None = None
-) -> None:
+def write(target: bpy.types.Object, timeline: Timeline, clock: Clock,
+          extent: tuple[float, float] | None = None) -> None:
     """Let the strips say `timeline`, in place of all that they asked for; automatic ones stay.
 
     extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it.

@@ -74,9 +74,8 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
     group.active = first if first < len(group.listed) else 0
 
 
-def add(
-    target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = ""
-) -> None:
+def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
+        why: str = "") -> None:
     """List one more."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why

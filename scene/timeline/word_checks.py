@@ -28,9 +28,8 @@ class BeyondMocapProblems(bpy.types.PropertyGroup):
 
     attached_to = ("WindowManager.beyond_mocap_problems",)
 
-    lines: bpy.props.CollectionProperty(
-        name="Problems", type=BeyondMocapProblem, description="Everything that was found when words last changed"
-    )
+    lines: bpy.props.CollectionProperty(name="Problems", type=BeyondMocapProblem,
+                                        description="Everything that was found when words last changed")
 
 
 def built(scene: bpy.types.Scene):
