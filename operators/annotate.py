@@ -53,7 +53,6 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
 
     @classmethod
     def poll(cls, context):
-        """There is somebody to say it of."""
         cls.poll_message_set("Import tracking in step 2 first, and choose a player of the list; or open a clip's words")
         return bool(name_of(context))
 
@@ -237,7 +236,6 @@ class VideoVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """The reference video."""
         cls.poll_message_set("Load a reference video first")
         return context.scene.beyond_mocap.video.clip is not None
 
@@ -287,7 +285,6 @@ its own speed whatever the scene's frame rate"""
     show: BoolProperty(name="Show", default=True, description="Open an editor beside the 3D view for it")
 
     def invoke(self, context, event):
-        """The file browser."""
         return ImportHelper.invoke(self, context, event)
 
     def do(self, context):
@@ -311,7 +308,6 @@ class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
     frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
 
     def do(self, context):
-        """Add to its begin."""
         video = context.scene.beyond_mocap.video
         video.begins += self.frames / video.rate
 
@@ -324,10 +320,8 @@ class BEYOND_MOCAP_OT_remove_video(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """There is one."""
         cls.poll_message_set("There is no reference video")
         return context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
-        """Release it."""
         video.release(context.scene)

@@ -52,7 +52,6 @@ from where it lies"""
 
     @classmethod
     def poll(cls, context):
-        """An armature or a ball."""
         cls.poll_message_set("Select an armature that strikes, or a ball")
         return body_meant(context) is not None or ball_meant(context) is not None
 
@@ -108,7 +107,6 @@ class BEYOND_MOCAP_OT_leave_aim(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """An aimed ball."""
         cls.poll_message_set("No ball is aimed" if not aimed(context.scene) else "Select an aimed ball or its target")
         ball = aimed_ball(context)
         if ball is not None and ball.beyond_mocap_aim.handed:
@@ -135,7 +133,6 @@ from the start to see it"""
 
     @classmethod
     def poll(cls, context):
-        """A ball that is animated."""
         cls.poll_message_set("Select a ball that moves")
         ball = ball_meant(context)
         if ball is None or ball.animation_data is None or ball.animation_data.action is None:
@@ -144,7 +141,6 @@ from the start to see it"""
         return ball.rigid_body is None
 
     def do(self, context):
-        """Hand it over."""
         ball = ball_meant(context)
         frame = self.frame or context.scene.frame_current
         kind = ball.beyond_mocap_aim.ball if self.ball == "OWN" else self.ball
@@ -162,13 +158,11 @@ class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """A ball that has been handed over."""
         cls.poll_message_set("Blender's physics has no ball that is selected")
         ball = ball_meant(context)
         return ball is not None and ball.beyond_mocap_aim.handed
 
     def do(self, context):
-        """Take it back."""
         handover.take_back(context.scene, ball_meant(context))
 
 
@@ -177,7 +171,6 @@ class HitVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """An armature."""
         cls.poll_message_set("Select an armature with a motion")
         return subject(context) is not None
 
@@ -203,7 +196,6 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
         return self.execute(context)
 
     def do(self, context):
-        """Analyse, note, mark."""
         body = subject(context)
         found = hits_shown.analyse(context.scene, body, self.part, side=self.side, threshold=self.threshold,
                                    bone=self.bone, markers=self.markers)
@@ -225,7 +217,6 @@ class BEYOND_MOCAP_OT_go_to_strike(Verb, bpy.types.Operator):
     frame: IntProperty(name="Frame", options={"SKIP_SAVE"}, description="Scene frame to go to")
 
     def do(self, context):
-        """Set the frame."""
         context.scene.frame_set(self.frame)
 
 
@@ -236,7 +227,6 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
     bl_label = "Clear Hit Analysis"
 
     def do(self, context):
-        """Markers and figures."""
         body = subject(context)
         channels.check_local(body)
         if not found_of(body.beyond_mocap_hits):
@@ -266,7 +256,6 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
 
     @classmethod
     def poll(cls, context):
-        """An armature and a ball."""
         cls.poll_message_set("Select an armature")
         if subject(context) is None:
             return False
@@ -274,7 +263,6 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
         return ball_of(context) is not None
 
     def do(self, context):
-        """Find the bone, carry."""
         body, ball, scene = subject(context), ball_of(context), context.scene
         bone = self.bone or possession.bone_of(scene, body, self.part, self.side)
         skin = 0.03 if self.bone else possession.SURFACE.get(self.part, 0.03)
@@ -294,13 +282,11 @@ After the last one the ball plays its own action again"""
 
     @classmethod
     def poll(cls, context):
-        """A ball that is carried."""
         cls.poll_message_set("Nobody carries the ball")
         ball = ball_of(context)
         return ball is not None and len(ball.beyond_mocap_ball.holds) > 0
 
     def do(self, context):
-        """One or all."""
         ball = ball_of(context)
         if self.number >= len(ball.beyond_mocap_ball.holds):
             raise InputError("stretch", f"number {self.number}", f"below {len(ball.beyond_mocap_ball.holds)}")
@@ -317,7 +303,6 @@ its touches proposals for key moments"""
 
     @classmethod
     def poll(cls, context):
-        """Somebody with a file."""
         cls.poll_message_set("Import tracking in step 2 first")
         player = active_player(context.scene.beyond_mocap)
         return player is not None and bool(player.tracking_file)
@@ -328,7 +313,6 @@ its touches proposals for key moments"""
 
     @staticmethod
     def work(order, progress, cancelled, hurry):
-        """Read and solve."""
         return tracked.work(order, progress, cancelled, hurry)
 
     def apply(self, scene, solved):
@@ -350,12 +334,10 @@ none is added"""
 
     @classmethod
     def poll(cls, context):
-        """There are touches."""
         cls.poll_message_set("Press Solve Ball first")
         return len(context.scene.beyond_mocap_passes.touches) > 0
 
     def do(self, context):
-        """Lay the moments."""
         player = active_player(context.scene.beyond_mocap)
         if self.active and player is None:
             raise InputError("player", "none in the list", "one", "import tracking in step 2")

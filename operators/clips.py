@@ -101,7 +101,6 @@ class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context):
-        """Where animators keep motions."""
         return context.area is not None and context.area.type in {"VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR"}
 
 
@@ -115,7 +114,6 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context):
-        """Where animators keep motions."""
         return BEYOND_MOCAP_FH_clips.poll_drop(context)
 
 
@@ -128,7 +126,6 @@ turns and kicks to the other side. The motion before is kept as an action"""
 
     @classmethod
     def poll(cls, context):
-        """An armature that moves."""
         body = context.object
         if body is None or body.type != "ARMATURE":
             cls.poll_message_set("Select an armature first")
@@ -137,7 +134,6 @@ turns and kicks to the other side. The motion before is kept as an action"""
         return channels.playing(body)[0] is not None
 
     def do(self, context):
-        """Read, mirror, write."""
         body = context.object
         motion = action.read(body, context.scene)
         start, name = action.first_frame(body), channels.playing(body)[0].name

@@ -26,7 +26,6 @@ class FolderVerb(BackgroundVerb):
 
     @classmethod
     def poll(cls, context):
-        """A folder has to be chosen."""
         cls.poll_message_set("Choose the library's folder first")
         return bool(context.scene.beyond_mocap.library_folder)
 
@@ -40,7 +39,6 @@ class ClipVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """A clip in the list."""
         cls.poll_message_set("No clip is listed; press Build Library or List Clips first")
         return clips.active(context.window_manager) is not None
 
@@ -91,7 +89,6 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
                           options={"SKIP_SAVE"})
 
     def order(self, context):
-        """Folder and unit."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
@@ -215,7 +212,6 @@ Library"""
     kind = "list"
 
     def order(self, context):
-        """The folder."""
         settings = context.scene.beyond_mocap
         folder = absolute(settings.library_folder)
         clips.check_folder(context.scene)
@@ -235,7 +231,6 @@ Library"""
         return order.setting, found, files
 
     def apply(self, _scene, result):
-        """Show them."""
         setting, found, files = result
         clips.keep(bpy.context.window_manager, setting, found, files)
         self.report({"INFO"}, f"clips listed: {len(found)}")
@@ -252,7 +247,6 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """A folder that was set once."""
         cls.poll_message_set("Choose the library's folder in the field above")
         return bool(context.scene.beyond_mocap.library_folder)
 
@@ -264,7 +258,6 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def do(self, context):
-        """Set the folder."""
         settings = context.scene.beyond_mocap
         chosen = bpy.path.abspath(self.directory) if self.directory else ""
         if chosen and not clips.holds_recordings(chosen):
@@ -304,12 +297,10 @@ were not saved are lost"""
 
     @classmethod
     def poll(cls, context):
-        """An armature that shows a clip."""
         cls.poll_message_set("Select the armature of a clip that came from the library's list")
         return bool(recordings.shown_clip(context.object))
 
     def do(self, context):
-        """Remove it."""
         rig = context.object
         if rig.library is not None or rig.override_library is not None:
             raise InputError(rig.name, "it belongs to another file", "an object of this file")

@@ -24,7 +24,6 @@ class OpenClipVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """An armature that shows a clip."""
         cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
         return bool(recordings.shown_clip(context.object))
 
@@ -138,7 +137,6 @@ class ProposalVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """Something is listed."""
         cls.poll_message_set("Open a clip with Annotate Clip first, and press Look Through")
         return context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0
 
@@ -155,7 +153,6 @@ class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         return next(text for name, _, text in WHAT if name == properties.what)
 
     def do(self, context):
@@ -171,7 +168,6 @@ the next one; Up and Down step, Esc leaves"""
     bl_label = "Judge by Keys"
 
     def do(self, _context):
-        """Keys need a window."""
         raise InputError("Judge by Keys", "no window", "a 3D view", "in scripts use Judge Proposal")
 
     def invoke(self, context, _event):

@@ -23,7 +23,6 @@ class OnMarkers:
 
     @classmethod
     def poll(cls, context):
-        """A cloud."""
         cls.poll_message_set("Select a cloud of markers (Import Markers makes one)")
         return cloud_meant(context) is not None
 
@@ -166,7 +165,6 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
     which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
 
     def do(self, context):
-        """Find it, apply it."""
         from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         thing = self.cloud(context)
@@ -188,7 +186,6 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
-        """Read it, apply it."""
         from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
         chosen = self.chosen()
@@ -229,13 +226,11 @@ places of their joints from it"""
 
     @classmethod
     def poll(cls, context):
-        """Two clouds at least, one of them active."""
         active = context.view_layer.objects.active
         cls.poll_message_set("Make the cloud of the static trial active; there have to be others")
         return is_cloud(active) and len(clouds(context.scene)) > 1
 
     def do(self, context):
-        """Point to it."""
         static = context.view_layer.objects.active
         others = [thing for thing in clouds(context.scene) if thing != static]
         chosen = [thing for thing in others if thing.select_get()] or others
@@ -305,7 +300,6 @@ named where the others tell. Reconstruct does the same for itself"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Clean it."""
         from ..beyond_mocap.markers.cleaning.clean import clean
 
         name, trial, clusters = order
@@ -338,7 +332,6 @@ clip of the library where asked for"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Reconstruct it."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
         made = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
@@ -374,7 +367,6 @@ the timeline"""
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
-        """Find it."""
         from ..beyond_mocap.markers.release.release import release
 
         name, trial, motion, settings = order
@@ -382,7 +374,6 @@ the timeline"""
         return name, release(trial, motion, settings)
 
     def apply(self, scene, result):
-        """Ball, timeline, figures."""
         name, found = result
         thing = scene.objects.get(name)
         if not is_cloud(thing):

@@ -72,11 +72,9 @@ The first minute is chosen"""
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
-        """Read them."""
         return order.read_match(asked, progress)
 
     def apply(self, scene, result):
-        """The list."""
         asked, read = result
         match = scene.beyond_mocap_match
         order.fill_match(match, asked, read)
@@ -115,17 +113,14 @@ class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """There is a list."""
         cls.poll_message_set("Press Read Match first")
         return len(context.scene.beyond_mocap_match.players) > 0
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         return next(item[2] for item in WHOM if item[0] == properties.whom)
 
     def do(self, context):
-        """Set the ticks."""
         match = context.scene.beyond_mocap_match
         chosen = active_of(match)
         for player in match.players:
@@ -144,7 +139,6 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
 
     @classmethod
     def poll(cls, context):
-        """A library and a match."""
         if not context.scene.beyond_mocap.library_folder:
             cls.poll_message_set("Choose the library's folder in step 1 first")
             return False
@@ -176,7 +170,6 @@ the one that is shown"""
 
     @classmethod
     def poll(cls, context):
-        """A library and a folder."""
         if not context.scene.beyond_mocap.library_folder:
             cls.poll_message_set("Choose the library's folder in step 1 first")
             return False
@@ -185,13 +178,11 @@ the one that is shown"""
         return bool(match.folder or match.made)
 
     def order(self, context):
-        """Folder and span."""
         wanted = order.wanted(context.scene, order.folder_to_show(context.scene))
         return wanted, self.known_library(wanted)
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
-        """Expand it."""
         wanted, library = asked
         return wanted, load.scenery(wanted, library, progress, cancelled), ()
 
@@ -201,7 +192,6 @@ class ShownMatchVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """The match that is shown."""
         cls.poll_message_set("Press Make Match or Show Match first")
         return bool(ours.bodies(context.scene))
 
@@ -217,7 +207,6 @@ seconds"""
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
 
     def invoke(self, context, _event):
-        """Ask which second."""
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
@@ -271,7 +260,6 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button shows."""
         return next(item[2] for item in WHICH if item[0] == properties.which)
 
     def do(self, context):
@@ -330,12 +318,10 @@ scene stays as it is"""
 
     @classmethod
     def poll(cls, context):
-        """A match is shown."""
         cls.poll_message_set("Show a match first")
         return bool(ours.bodies(context.scene))
 
     def do(self, context):
-        """Write it."""
         path = self.out()
         scene = context.scene
         everybody = ours.bodies(scene)

@@ -38,7 +38,6 @@ stands, which becomes his body"""
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         one = {"players": "player", "passes": "pass"}[properties.rows]
         if properties.what == "ADD" and one == "player":
             return (
@@ -51,7 +50,6 @@ stands, which becomes his body"""
         return f"Move the picked {one} {moved}" if moved else f"Remove the picked {one}"
 
     def do(self, context):
-        """One of four things."""
         settings = context.scene.beyond_mocap_passes
         if self.what == "ADD":
             return add_player(context) if self.rows == "players" else add_pass(settings)
@@ -149,7 +147,6 @@ flight leaves one body at its strike and arrives at the next one at his"""
 
     @classmethod
     def poll(cls, context):
-        """Players and passes."""
         cls.poll_message_set("Add players and passes, or take a sample")
         settings = context.scene.beyond_mocap_passes
         return len(settings.players) > 1 and len(settings.passes) > 0
@@ -162,7 +159,6 @@ flight leaves one body at its strike and arrives at the next one at his"""
 
     @staticmethod
     def work(order, progress, cancelled, hurry):
-        """Play the scene."""
         return make.work(order, progress, cancelled, hurry)
 
     def apply(self, scene, result):
@@ -198,12 +194,10 @@ lists stay"""
 
     @classmethod
     def poll(cls, context):
-        """A scene is shown."""
         cls.poll_message_set("Nothing has been made")
         return bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):
-        """Take it away."""
         make.clear(context.scene)
 
 

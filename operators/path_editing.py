@@ -21,7 +21,6 @@ class RiderVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """A rider."""
         cls.poll_message_set("Select an armature that rides a path, or its curve")
         return bool(meant(context))
 
@@ -47,7 +46,6 @@ back"""
 
     @classmethod
     def poll(cls, context):
-        """Armatures."""
         cls.poll_message_set("Leave edit mode first (Tab)")
         if context.mode not in {"OBJECT", "POSE"}:
             return False
@@ -108,7 +106,6 @@ curve before is removed if it was made here and nobody else rides it"""
 
     @classmethod
     def poll(cls, context):
-        """A rider."""
         cls.poll_message_set("Leave edit mode first (Tab)")
         if context.mode not in {"OBJECT", "POSE"}:
             return False
@@ -131,7 +128,6 @@ class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
     bl_label = "Update Path"
 
     def do(self, context):
-        """All that are meant."""
         for body in meant(context):
             riders.renew(context.scene, body, anew=True)
             measure.measure(context.scene, body)
@@ -154,12 +150,10 @@ as little as it takes. Of two or more selected riders only those give way; other
 
     @classmethod
     def poll(cls, context):
-        """A rider."""
         cls.poll_message_set("Let an armature ride a path first (Edit Path)")
         return bool(riders_in(context.scene))
 
     def do(self, context):
-        """Find out, then ask."""
         from ..beyond_mocap.path_editing.apart import Limits
         from ..beyond_mocap.path_editing.follower import Change
 
@@ -209,7 +203,6 @@ again"""
     bl_label = "Leave"
 
     def do(self, context):
-        """All that are meant."""
         chosen = meant(context)
         riders.leave(*chosen)
         riders.back_to(context, chosen)
@@ -242,7 +235,6 @@ looks"""
 
     @classmethod
     def poll(cls, context):
-        """A curve is in edit mode."""
         cls.poll_message_set("Select a curve and go into edit mode with Tab first")
         return context.mode == "EDIT_CURVE"
 

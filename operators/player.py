@@ -163,7 +163,6 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
         return len(context.scene.beyond_mocap.players) > 0
 
     def do(self, context):
-        """Select the dot."""
         settings = context.scene.beyond_mocap
         active = settings.players[min(settings.active_player, len(settings.players) - 1)]
         player = settings.players.get(self.player) if self.player else active
@@ -183,7 +182,6 @@ strips. Files of earlier versions need this once; texts and files stay as they a
 
     @classmethod
     def poll(cls, context):
-        """A player without strips."""
         cls.poll_message_set("Every player in the list has strips already")
         return any(strips.dot_of(player, context.scene) is None for player in context.scene.beyond_mocap.players)
 
@@ -216,7 +214,6 @@ strips come along"""
 
     @classmethod
     def poll(cls, context):
-        """A dot without a player is selected."""
         cls.poll_message_set("Select a dot that was appended from another file first")
         return bool(dots.orphans(context))
 
@@ -242,7 +239,6 @@ what his track is drawn by stay in the scene, and a preview that he shows is kep
 
     @classmethod
     def poll(cls, context):
-        """There is one."""
         cls.poll_message_set("The list of players is empty")
         return active_player(context.scene.beyond_mocap) is not None
 

@@ -41,7 +41,6 @@ Accepted results can be turned from one form into the other"""
 
     @classmethod
     def poll(cls, context):
-        """There is something to accept."""
         cls.poll_message_set("Synthesize first")
         return any(player.use and (player.take or player.result.state != "NONE")
                    for player in context.scene.beyond_mocap.players)
@@ -75,12 +74,10 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """There is a preview."""
         cls.poll_message_set("No preview is shown: Synthesize shows one")
         return any(player.use and player.result.state == "PREVIEW" for player in context.scene.beyond_mocap.players)
 
     def do(self, context):
-        """Every chosen player's preview."""
         players = [player for player in self.chosen(context) if player.result.state == "PREVIEW"]
         if not players:
             raise InputError("discard", "no preview is shown", "a preview", "synthesize first")
@@ -102,7 +99,6 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """There are variants."""
         cls.poll_message_set("No variants: press Variants first")
         return any(player.result.variants for player in context.scene.beyond_mocap.players)
 
@@ -126,7 +122,6 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
 
     @classmethod
     def poll(cls, context):
-        """A player with a body."""
         cls.poll_message_set("Synthesize first: the active player has no body with a take")
         player = active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
@@ -134,7 +129,6 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
         return bool(player.take) or quality.has_error_curves(player.body)
 
     def do(self, context):
-        """Write or remove them."""
         player = active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
             raise InputError("error curves", "no player with a body", "one", "synthesize first")

@@ -28,7 +28,6 @@ class MapVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """A rig is chosen."""
         cls.poll_message_set("Choose a rig first")
         return context.scene.beyond_mocap.rig.target is not None
 
@@ -40,7 +39,6 @@ class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
     bl_label = "Map Bones"
 
     def do(self, context):
-        """Fill the list anew."""
         settings = context.scene.beyond_mocap.rig
         settings.told = f"Bones mapped {rig.fill(settings, again=True)}"
 
@@ -74,7 +72,6 @@ class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Write it."""
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose where to write it")
         settings = context.scene.beyond_mocap.rig
@@ -91,7 +88,6 @@ class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Read, check, show."""
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose one")
         settings = context.scene.beyond_mocap.rig
@@ -108,7 +104,6 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """An armature is active."""
         cls.poll_message_set("Select the rig first")
         return context.object is not None and context.object.type == "ARMATURE"
 
@@ -141,7 +136,6 @@ on the ground. What the rig played before is kept as an action"""
 
     @classmethod
     def poll(cls, context):
-        """A rig and something to bake."""
         settings = context.scene.beyond_mocap
         rigs = (settings.rig.target, *(player.rig for player in settings.players))
         if not any(rigs) and not any(o.type == "ARMATURE" for o in context.selected_objects):
@@ -216,14 +210,12 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """A rig that was baked."""
         cls.poll_message_set("The chosen rig plays nothing that was baked here")
         target = context.scene.beyond_mocap.rig.target
         playing = channels.playing(target)[0] if target is not None else None
         return playing is not None and bool(playing.get(bake_record.MARK))
 
     def do(self, context):
-        """Off with it."""
         bake_record.remove(context.scene.beyond_mocap.rig.target)
 
 
@@ -306,7 +298,6 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Something to export."""
         cls.poll_message_set("Synthesize and accept first, or select an armature that moves")
         settings = context.scene.beyond_mocap
         return bool(settings.players) or settings.rig.target is not None or any(
@@ -320,7 +311,6 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
         return super().invoke(context, event)
 
     def do(self, context):
-        """Write it."""
         path = self.out()
         rigs = self.rigs(context)
         wanted = export.Wanted(path, self.format, self.engine, rate=self.rate(context), root=self.root,
@@ -366,7 +356,6 @@ class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
 
     @classmethod
     def poll(cls, context):
-        """An armature."""
         cls.poll_message_set("Select an armature first")
         return context.object is not None and context.object.type == "ARMATURE"
 

@@ -21,7 +21,6 @@ class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
     camera: BoolProperty(name="Camera", default=True, description="Add a camera and look through it when rendering")
 
     def do(self, context):
-        """Make it."""
         stage.create(context, self.camera)
 
 
@@ -71,7 +70,6 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """There are such cameras."""
         cls.poll_message_set("Press Path Cameras in the panel Path Editing first")
         return path_cameras.any_in(context.scene)
 

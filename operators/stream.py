@@ -23,7 +23,6 @@ Nothing from other machines gets in, and nothing is sent"""
 
     @classmethod
     def poll(cls, context):
-        """One stream at a time."""
         cls.poll_message_set("A stream is listened to already: press Stop Stream first")
         return receiver.listener() is None
 
@@ -38,7 +37,6 @@ class ListeningVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """The stream that is received."""
         cls.poll_message_set("No stream is listened to: press Start Stream first")
         return receiver.listener() is not None
 
@@ -51,7 +49,6 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        """Close."""
         receiver.stop()
         follow.tell()
 
@@ -61,7 +58,6 @@ class PlayingVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """What is played live."""
         cls.poll_message_set("Nothing is played live: press Play Live first")
         return play.rally() is not None
 
@@ -74,7 +70,6 @@ class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        """No more."""
         play.stop()
         told = context.window_manager.beyond_mocap_streaming
         told.playing, told.played = False, ""
@@ -110,7 +105,6 @@ the scene plays on meanwhile"""
 
     @classmethod
     def poll(cls, context):
-        """Players."""
         cls.poll_message_set("Add players and passes, or take a sample, under Passing Scene")
         settings = context.scene.beyond_mocap_passes
         return len(settings.players) > 1 and len(settings.passes) > 0
@@ -122,7 +116,6 @@ the scene plays on meanwhile"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Everybody stands."""
         return play.begin(*order, progress, cancelled)
 
     def apply(self, scene, result):
@@ -139,7 +132,6 @@ class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
     number: IntProperty(name="Number", default=1, min=1, max=99, description="Of the player in the list, from 1")
 
     def do(self, context):
-        """Remember who."""
         names = [row.name for row in context.scene.beyond_mocap_passes.players]
         if self.number > len(names):
             raise InputError("player", f"number {self.number}", f"1 to {len(names)}")
@@ -157,7 +149,6 @@ as if you had just done it yourself"""
 
     @classmethod
     def poll(cls, context):
-        """A rally, and an armature that shows how."""
         cls.poll_message_set("Press Play Live, and select an armature whose motion has a strike")
         return play.rally() is not None and subject(context) is not None
 

@@ -43,7 +43,6 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
     again: BoolProperty(name="Again", description="Also clips that are there already")
 
     def invoke(self, context, _event):
-        """Ask for the folder."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

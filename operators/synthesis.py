@@ -33,7 +33,6 @@ After the file was opened again the take is made again as it was"""
 
     @classmethod
     def poll(cls, context):
-        """A take."""
         if not super().poll(context):
             return False
         cls.poll_message_set("Synthesize first")
@@ -90,7 +89,6 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         if properties.player:
             return f"Leave {properties.player} as it is: take it out of the queue"
         if properties.keep:
@@ -124,7 +122,6 @@ of an accepted result, of a selected span of words, or the preview range. All el
 
     @classmethod
     def poll(cls, context):
-        """A take."""
         cls.poll_message_set("Synthesize first")
         return any(player.take for player in context.scene.beyond_mocap.players)
 
@@ -151,7 +148,6 @@ They are switched by the row of numbers; Accept keeps the one that is shown, the
 
     @classmethod
     def poll(cls, context):
-        """A library and an active player."""
         if not context.scene.beyond_mocap.library_folder:
             cls.poll_message_set("Choose the library's folder in step 1 first")
             return False

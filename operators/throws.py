@@ -17,7 +17,6 @@ class AtTarget(BackgroundVerb):
 
     @classmethod
     def poll(cls, context):
-        """An armature."""
         cls.poll_message_set("Select the armature that throws or kicks")
         return thrower(context) is not None
 
@@ -27,11 +26,9 @@ class AtTarget(BackgroundVerb):
 
     @staticmethod
     def work(order_, progress, cancelled, hurry):
-        """Make it."""
         return made.work(order_, progress, cancelled, hurry)
 
     def apply(self, scene, result):
-        """Armature, ball and figures."""
         body = scene.objects.get(result.order.body)
         if body is None or body.type != "ARMATURE":
             raise InputError(f"armature {result.order.body}", "it is gone meanwhile", "the same armature",
@@ -57,7 +54,6 @@ class ThrownVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """The meant armature shows one."""
         cls.poll_message_set("Select an armature that throws or kicks")
         body = thrower(context)
         return body is not None and bool(body.beyond_mocap_throw.made)

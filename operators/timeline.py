@@ -23,7 +23,6 @@ class TimelineVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """There is somebody with strips."""
         cls.poll_message_set("Import tracking in step 2 first, and bring its players to the timeline")
         return timeline_subject(context) is not None
 
@@ -39,7 +38,6 @@ class WritingVerb(TimelineVerb):
 
     @classmethod
     def poll(cls, context):
-        """There is a player."""
         cls.poll_message_set("Import tracking in step 2 first")
         return can_have_timeline(context)
 
@@ -49,7 +47,6 @@ class MomentVerb(TimelineVerb):
 
     @classmethod
     def poll(cls, context):
-        """A key moment is picked."""
         if not super().poll(context):
             return False
         cls.poll_message_set("Pick a key moment first: click its name in the NLA editor or in the list")
@@ -98,7 +95,6 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Somebody has a timeline."""
         cls.poll_message_set("Import tracking in step 2 first")
         return any(player.dot for player in context.scene.beyond_mocap.players)
 
@@ -294,7 +290,6 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
     words: StringProperty(name="Words", default="kick", description="What happens there; -word for what must not be")
 
     def invoke(self, context, _event):
-        """Ask for the words."""
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
@@ -303,7 +298,6 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
 
     def do(self, context):
-        """Set the marker, picked."""
         said(self.words, 0.0)
         target = subject_with_lanes(context)
         lay_strips.add_moment(target, said(self.words, playhead(context, target)), subject_clock(context, target))
@@ -318,7 +312,6 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
     frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="By how many frames; 0 moves to the playhead")
 
     def do(self, context):
-        """Put its marker there."""
         target = timeline_subject(context)
         moment, clock = picked(target), lanes.written_for(target)
         time = clock.seconds(moment.frame + self.frames) if self.frames else playhead(context, target)
@@ -332,7 +325,6 @@ class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
     bl_label = "Delete Key Moment"
 
     def do(self, context):
-        """Remove its marker."""
         target = timeline_subject(context)
         moment = picked(target)
         lay_strips.remove_moment(target, moment.strip, moment.index)

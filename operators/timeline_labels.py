@@ -36,7 +36,6 @@ playhead on"""
                        description="Seconds on the track's clock")
 
     def invoke(self, context, _event):
-        """Ask for the words."""
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
@@ -45,7 +44,6 @@ playhead on"""
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0, 1.0))
 
     def do(self, context):
-        """Lay the strip."""
         given = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
         start, end = given if self.end != self.start else self.stretch(context)
         if end <= start:
@@ -71,7 +69,6 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
     bl_label = "Split Span at Playhead"
 
     def do(self, context):
-        """Each becomes two."""
         target = timeline_subject(context)
         time, clock = playhead(context, target), lanes.written_for(target)
         frame = clock.whole(time)
@@ -93,7 +90,6 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Two strips are selected."""
         if not super().poll(context):
             return False
         cls.poll_message_set("Select two or more strips of one player first")
@@ -170,7 +166,6 @@ or that the library does not have, are told while you type"""
         draw_complaints(self.layout, context, lambda: _said(self.words, chosen(timeline_subject(context))))
 
     def do(self, context):
-        """Write them."""
         target = timeline_subject(context)
         placed = chosen(target)
         item = _said(self.words, placed)
@@ -211,7 +206,6 @@ text. Strips and key moments that are there now are replaced"""
 
     @classmethod
     def poll(cls, context):
-        """A player with a text or a file."""
         player = active_player(context.scene.beyond_mocap)
         cls.poll_message_set("Import tracking, and choose a file or text with words in step 2 first")
         return player is not None and (player.annotation_text is not None or bool(player.annotation_file))
@@ -260,7 +254,6 @@ seconds"""
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
-        """Write the file."""
         if not self.filepath:
             raise InputError("export", "no file given", "a place to write", "choose one")
         target = timeline_subject(context)
@@ -283,7 +276,6 @@ clip whose armature is active. Strips that are there are replaced"""
 
     @classmethod
     def poll(cls, context):
-        """Somebody whose words they are."""
         cls.poll_message_set("Import tracking first: words belong to a player")
         return bool(recordings.shown_clip(context.object)) or active_player(context.scene.beyond_mocap) is not None
 

@@ -25,12 +25,10 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
 
     @classmethod
     def poll(cls, context):
-        """Object mode, since something is added."""
         cls.poll_message_set("Leave edit mode first (Tab)")
         return context.mode == "OBJECT"
 
     def do(self, context):
-        """Curve, player, dot."""
         scene = context.scene
         channels.check_local(scene)
         name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
@@ -67,7 +65,6 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
 
     @classmethod
     def poll(cls, context):
-        """An object that may be one."""
         cls.poll_message_set("Choose a curve or a moving object first")
         return context.object is not None and is_track(None, context.object)
 
@@ -102,19 +99,16 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
 
     @classmethod
     def poll(cls, context):
-        """A curve."""
         cls.poll_message_set("Choose a drawn curve first")
         return context.object is not None and context.object.type == "CURVE"
 
     def invoke(self, context, _event):
-        """Ask for the numbers."""
         points = chosen(context.object)
         if points:
             self.speed, self.wait = min(points[0].radius, FASTEST), points[0].weight_softbody
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
-        """Set them."""
         drawn = context.object
         channels.check_local(drawn, drawn.data)
         points = chosen(drawn)
@@ -150,7 +144,6 @@ with G; time and hold stand in the list of pins"""
 
     @classmethod
     def poll(cls, context):
-        """A player, and object mode."""
         if active_player(context.scene.beyond_mocap) is None:
             cls.poll_message_set("Import tracking or draw a track in step 2 first")
             return False
@@ -182,7 +175,6 @@ class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """A pin."""
         player = active_player(context.scene.beyond_mocap)
         cls.poll_message_set("The active player has no pins")
         return player is not None and len(player.pins) > 0

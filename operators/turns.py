@@ -68,7 +68,6 @@ class TurnsVerb(Verb):
 
     @classmethod
     def poll(cls, context):
-        """A library and a player."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             cls.poll_message_set("Choose the library's folder in step 1 first")

@@ -23,7 +23,6 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
     """Touches that were solved from tracking."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One touch."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         named = row.split(factor=0.62)
@@ -221,7 +220,6 @@ class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
     """The players of a passing scene."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One player."""
         row = layout.row(align=True)
         row.prop(item, "name", text="", emboss=False)
         row.label(text="", icon=PART_ICONS[item.part])
@@ -236,7 +234,6 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
     """The passes, one after the other."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One pass."""
         row = layout.row(align=True)
         row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
         bounces = row.row()

@@ -14,7 +14,6 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
     """The clips of the library that fit what is looked for: quality, name, words, length, and a button that imports."""
 
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
-        """One clip."""
         row = layout.row(align=True)
         names = row.split(factor=0.66, align=True)
         names.label(text=clip.name, icon=MARKS[clip.mark])
@@ -29,7 +28,6 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
     """What was proposed for a clip: what became of it, the words, how sure they are, and buttons to judge them."""
 
     def draw_item(self, _context, layout, _data, one, _icon, _active_data, _active_property, index=0):
-        """One proposal."""
         row = layout.row(align=True)
         row.active = one.state != "REFUSED"
         names = row.split(factor=0.72, align=True)

@@ -12,7 +12,6 @@ class BEYOND_MOCAP_UL_players(bpy.types.UIList):
     """Players with their shirts; a tick for those that the next steps are about."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One player."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         row.prop(item, "name", text="", emboss=False)
@@ -71,7 +70,6 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
     """A player's pins: what is held, when and how long."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One pin."""
         row = layout.row(align=True)
         row.prop(item, "part", text="", emboss=False)
         if item.target is None:

@@ -11,7 +11,6 @@ class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
     """Parts of the body and the bones that move them."""
 
     def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_property):
-        """One part."""
         row = layout.split(factor=0.42)
         row.label(text=item.name.replace("_", " ").capitalize())
         target = context.scene.beyond_mocap.rig.target
@@ -26,7 +25,6 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
     bl_order = 5
 
     def draw(self, context):
-        """Rig, map, bake, export."""
         layout, rig = self.layout, context.scene.beyond_mocap.rig
         column = layout.column()
         column.use_property_split, column.use_property_decorate = True, False

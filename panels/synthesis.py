@@ -33,11 +33,9 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
     bl_order = 3
 
     def draw_header_preset(self, _context):
-        """The presets."""
         BEYOND_MOCAP_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
-        """Button, progress, choices."""
         layout, settings = self.layout, context.scene.beyond_mocap
         row = layout.row(align=True)
         row.scale_y = 1.3

@@ -22,11 +22,9 @@ class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):
-        """One switch for all."""
         self.layout.prop(context.scene.beyond_mocap.view, "show", text="")
 
     def draw(self, context):
-        """Switches, choices, buttons."""
         layout, settings = self.layout, context.scene.beyond_mocap
         view = settings.view
         layout.row().prop(view, "players", expand=True)

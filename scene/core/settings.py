@@ -7,15 +7,7 @@ Paths may be relative to the file. What is too large for a file's properties (a 
 from __future__ import annotations
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..overlays.settings import BeyondMocapView
 from ..player.pins import BeyondMocapPin
@@ -23,6 +15,8 @@ from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
 from ..timeline.video import BeyondMocapVideo, renew
 from .properties import active_row, with_settings
+
+FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
@@ -48,9 +42,8 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 
     name: StringProperty(name="Name", update=show_on_dot, description="What this player is called")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
-    tracking_file: StringProperty(name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-                                  description="The file with this player's positions")
-    metadata_file: StringProperty(name="Metadata", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+    tracking_file: StringProperty(name="Tracking", description="The file with this player's positions", **FILE)
+    metadata_file: StringProperty(name="Metadata", **FILE,
                                   description="The provider's second file, where there is one (pitch, teams)")
     feed_id: StringProperty(name="ID in the feed",
                             description="Which player of the tracking file this is; empty for a file of one player")
@@ -62,15 +55,14 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     pins: CollectionProperty(type=BeyondMocapPin, description="Where hands, feet and gaze have to be, and when")
     active_pin: IntProperty(name="Pin", min=0, description="The pin that is shown below the list")
     annotation_file: StringProperty(
-        name="Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        name="Words", **FILE,
         description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
     )
-    annotation_text: PointerProperty(
-        name="Text", type=bpy.types.Text,
-        description="A text of this file with the words; it counts more than the file on disk",
-    )
-    shirt: FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-                               description="Colour of the player's shirt", update=show_on_dot)
+    annotation_text: PointerProperty(name="Text", type=bpy.types.Text,
+                                     description="A text of this file with the words; it counts more than the file "
+                                     "on disk")
+    shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, update=show_on_dot,
+                                         default=(0.75, 0.05, 0.06), description="Colour of the player's shirt")
     dot: PointerProperty(name="Dot", type=bpy.types.Object,
                          description="The Empty that runs along the track and carries the strips of the player's words")
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=is_armature,
@@ -104,7 +96,7 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
         description="Folder of BVH clips with their annotations; may be relative to this file",
     )
     words_model: StringProperty(
-        name="Learned Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        name="Learned Words", **FILE,
         description="What Learn from Words has kept, of this library or another; empty: Propose Words goes by rules",
     )
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
