@@ -139,8 +139,7 @@ def of_aimed_ball(layout, ball) -> None:
     row.label(text=ball.name, icon="SPHERE")
     row.prop(settings, "live", text="", icon="LINKED" if settings.live else "UNLINKED")
     row.operator("beyond_mocap.leave_aim", text="", icon="X")
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
+    column = split(layout)
     column.enabled = not settings.handed
     column.prop(settings, "target")
     column.row().prop(settings, "way", expand=True)
@@ -180,8 +179,7 @@ def physics(layout, context, ball) -> None:
 def stream(layout, context) -> None:
     """Where to listen, how it does, and the last strike."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
+    column = split(layout)
     chosen = column.column()
     chosen.enabled = not told.on
     for name in ("protocol", "port", "clip", "unit", "part", "side", "threshold"):
@@ -203,8 +201,7 @@ def stream(layout, context) -> None:
 def live(panel, layout, context) -> None:
     """Who has the ball, and to whom it goes."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
+    column = split(layout)
     column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
     column.prop(settings, "bounces")
     row = layout.row(align=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, paragraph, table
+from .tab import Step, paragraph, part, table
 
 MARKS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
 STATES = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
@@ -67,20 +67,14 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
             box.operator("beyond_mocap.build_library", text="Build Anew", icon="FILE_REFRESH")
         first, *held = settings.library_holds.splitlines() or ("",)
         if held:
-            header, body = layout.panel("beyond_mocap_library_holds", default_closed=True)
-            header.label(text=first)
-            if body:
+            if body := part(layout, "library_holds", first):
                 table(body, held)
-        header, body = layout.panel("beyond_mocap_library_clips", default_closed=True)
-        header.label(text=f"Clips ({listing.total})" if current and listing.total else "Clips")
-        if body:
+        if body := part(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total else "Clips"):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
             draw_opened(layout, context.object, settings)
         self.progress(context, "learning")
-        header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
-        header.label(text="Tools")
-        if body:
+        if body := part(layout, "library_more", "Tools"):
             draw_tools(body, settings)
 
 
@@ -106,9 +100,7 @@ def draw_clips(layout, settings, listing, current) -> None:
     row = layout.row(align=True)
     row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
     row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path
-    header, body = layout.panel("beyond_mocap_library_assets", default_closed=True)
-    header.label(text="Assets")
-    if body:
+    if body := part(layout, "library_assets", "Assets"):
         draw_assets(body, listing)
 
 

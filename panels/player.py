@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import active_player
-from .tab import Step, paragraph
+from .tab import Step, paragraph, part, split
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
@@ -44,8 +44,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         if player is None:
             paragraph(layout, "Import a file with positions, drop it into the view, or draw a track", "INFO")
             return
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+        column = split(layout)
         column.prop(player, "drawn_track")
         if player.drawn_track is not None:
             drawn_on(column, player)
@@ -88,9 +87,7 @@ def drawn_on(column, player) -> None:
 
 def own(layout, player) -> None:
     """What is this player's own: height, foot, style."""
-    header, body = layout.panel("beyond_mocap_player_own", default_closed=True)
-    header.label(text="Player")
-    if body:
+    if body := part(layout, "player_own", "Player"):
         body.use_property_split, body.use_property_decorate = True, False
         for name in ("height", "strong_foot", "style", "style_weight"):
             body.prop(player, name)
@@ -98,9 +95,7 @@ def own(layout, player) -> None:
 
 def pinned(layout, player) -> None:
     """Where hands, feet and gaze have to be."""
-    header, body = layout.panel("beyond_mocap_player_pins", default_closed=True)
-    header.label(text=f"Pins: {len(player.pins)}" if player.pins else "Pins")
-    if body:
+    if body := part(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
         row = body.row()
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")

@@ -11,6 +11,7 @@ import bpy
 import rna_keymap_ui
 
 from ..scene.core.preferences import EXTENSION, Preferences
+from .tab import part
 
 
 def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
@@ -41,9 +42,7 @@ class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
         column.use_property_split = True
         column.prop(self, "cache_folder", placeholder="Beside each library")
         column.prop(self, "threads", text="Threads (0: all)")
-        header, body = layout.panel("beyond_mocap_keys")
-        header.label(text="Keys")
-        if body:
+        if body := part(layout, "keys", "Keys", closed=False):
             draw_keys(body, context)
 
 
