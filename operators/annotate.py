@@ -276,7 +276,6 @@ its own speed whatever the scene's frame rate"""
 
     bl_idname = "beyond_mocap.load_video"
     bl_label = "Load Reference Video"
-
     filter_glob: StringProperty(default=FILES, options={"HIDDEN"})
     rate: FloatProperty(
         name="Frames per Second", default=0.0, min=0.0, max=1000.0, precision=3,
@@ -304,7 +303,6 @@ class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.move_video"
     bl_label = "Move Reference Video"
-
     frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
 
     def do(self, context):

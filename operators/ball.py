@@ -32,7 +32,6 @@ from where it lies"""
 
     bl_idname = "beyond_mocap.aim_ball"
     bl_label = "Aim Ball"
-
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the ball is struck with")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     found: BoolProperty(
@@ -126,7 +125,6 @@ from the start to see it"""
 
     bl_idname = "beyond_mocap.ball_to_physics"
     bl_label = "Ball to Physics"
-
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
     ball: EnumProperty(name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
                        description="What kind of ball it is")
@@ -181,7 +179,6 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
 
     bl_idname = "beyond_mocap.hit_analysis"
     bl_label = "Hit Analysis"
-
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     threshold: FloatProperty(name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
@@ -213,7 +210,6 @@ class BEYOND_MOCAP_OT_go_to_strike(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.go_to_strike"
     bl_label = "Go to Strike"
-
     frame: IntProperty(name="Frame", options={"SKIP_SAVE"}, description="Scene frame to go to")
 
     def do(self, context):
@@ -244,7 +240,6 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
 
     bl_idname = "beyond_mocap.take_ball"
     bl_label = "Take Ball"
-
     part: EnumProperty(name="Part", items=PARTS, default="hand", description="What carries the ball")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
@@ -277,7 +272,6 @@ After the last one the ball plays its own action again"""
 
     bl_idname = "beyond_mocap.free_ball"
     bl_label = "Free Ball"
-
     number: IntProperty(name="Stretch", default=-1, min=-1, options={"SKIP_SAVE"}, description="Which one; -1: all")
 
     @classmethod
@@ -328,7 +322,6 @@ none is added"""
 
     bl_idname = "beyond_mocap.accept_touches"
     bl_label = "Accept Touches"
-
     active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
                          description="Only those of the active player")
 

@@ -17,7 +17,7 @@ from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place
 from ..beyond_mocap.motion.quaternion import about_up, rotate
-from ..scene.core import action, channels
+from ..scene.core import action, channels, window
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
 from .verb import BackgroundVerb, ImportVerb, Verb
@@ -30,7 +30,6 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
     filename_ext = ".bvh"
-
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
     unit: FloatProperty(name="Metres per unit", default=0.0, min=0.0, precision=5,
                         description="Size of one unit of the file in metres; 0 guesses it from the height of the hips")
@@ -59,11 +58,7 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
             made.append(body)
             for note in clip.notes:
                 self.report({"INFO"}, f"{name}: {note}")
-        for other in context.selected_objects:
-            other.select_set(False)
-        for body in made:
-            body.select_set(True)
-        context.view_layer.objects.active = made[-1]
+        window.select_only(context, made[-1], *made)
         self.report({"INFO"}, f"clips imported at the scene's frame rate: {len(made)}")
 
     def read(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
@@ -172,7 +167,6 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
     bl_idname = "beyond_mocap.make_assets"
     bl_label = "Clips as Assets"
     kind = "assets"
-
     which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
     apart: BoolProperty(name="As a File", description="Write a .blend of their own and leave this file as it is",
                         options={"SKIP_SAVE"})

@@ -84,7 +84,6 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     queue = None  # foreign.Queue while a window waits for conversions
     job = None
     notes = ()
-
     rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept",
                           options={"SKIP_SAVE"})
 
@@ -241,7 +240,6 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.relink_library"
     bl_label = "Relink Library"
-
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
 

@@ -59,7 +59,6 @@ yours to add"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"
-
     least: FloatProperty(name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
                          description="Proposals that are less sure than this are left out")
     replace: BoolProperty(
@@ -146,7 +145,6 @@ class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.judge_proposal"
     bl_label = "Judge Proposal"
-
     what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="What becomes of it")
     index: IntProperty(name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
                        description="Its place in the list; -1: the chosen one")
@@ -267,7 +265,6 @@ of it. What is written there already is overwritten only when you say so"""
     bl_idname = "beyond_mocap.save_words"
     bl_label = "Save Words"
     bl_options = {"REGISTER"}
-
     overwrite: BoolProperty(name="Overwrite", description="Replace what is written about this clip",
                             options={"SKIP_SAVE"})
 
@@ -321,7 +318,6 @@ same acts in others. What is learned is kept in a file, which serves any library
     bl_idname = "beyond_mocap.learn_words"
     bl_label = "Learn from Words"
     kind = "learning"
-
     out: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
                         description="Where it is kept; empty: in the cache")
 

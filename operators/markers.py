@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene.core import channels
+from ..scene.core import channels, window
 from ..scene.core.settings import as_setting
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
@@ -54,7 +54,6 @@ set know their segments at once"""
     bl_idname = "beyond_mocap.import_markers"
     bl_label = "Import Markers"
     filename_ext = ".c3d"
-
     filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
     unit: FloatProperty(
         name="Metres per unit", default=0.0, min=0.0, precision=5,
@@ -78,11 +77,7 @@ set know their segments at once"""
         if context.mode != "OBJECT":  # what is edited would stay so beside what is then active
             bpy.ops.object.mode_set(mode="OBJECT")
         made = [self.add(context, path, trial) for path, trial in trials]
-        for other in context.selected_objects:
-            other.select_set(False)
-        for thing in made:
-            thing.select_set(True)
-        context.view_layer.objects.active = made[0]
+        window.select_only(context, *made)
 
     def add(self, context, path: Path, trial) -> bpy.types.Object:
         """One cloud, and what is to be said of it."""
@@ -129,7 +124,6 @@ class BEYOND_MOCAP_OT_assign_markers(OnMarkers, Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.assign_markers"
     bl_label = "Assign Markers"
-
     segment: EnumProperty(name="Segment", items=segments, description="The segment of the body that carries them")
 
     def do(self, context):
@@ -161,7 +155,6 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.use_marker_set"
     bl_label = "Use Marker Set"
-
     which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
 
     def do(self, context):
@@ -182,17 +175,14 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
     bl_idname = "beyond_mocap.load_marker_set"
     bl_label = "Load Marker Set"
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
         from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one marker set")
+        path = self.chosen_one("one marker set")
         thing = self.cloud(context)
-        for line in sets.apply(thing, read_marker_set(chosen[0])):
+        for line in sets.apply(thing, read_marker_set(path)):
             self.report({"WARNING"}, line)
 
 
@@ -204,7 +194,6 @@ line"""
     bl_label = "Save Marker Set"
     bl_options = {"REGISTER"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
@@ -248,20 +237,17 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
     bl_idname = "beyond_mocap.load_marker_model"
     bl_label = "Load Marker Model"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
         """Read it, keep it with the cloud."""
         from ..beyond_mocap.markers.files.model_json import read_model
 
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one MODEL.json")
+        path = self.chosen_one("one MODEL.json")
         thing = self.cloud(context)
-        models.onto(thing, read_model(chosen[0]))
+        models.onto(thing, read_model(path))
         thing.beyond_mocap_cloud.use_model = True
-        self.report({"INFO"}, f"{thing.name}: model from {chosen[0].name}")
+        self.report({"INFO"}, f"{thing.name}: model from {path.name}")
 
 
 class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
@@ -271,7 +257,6 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
     bl_label = "Save Marker Model"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):

@@ -57,7 +57,6 @@ The first minute is chosen"""
     bl_idname = "beyond_mocap.read_match"
     bl_label = "Read Match"
     kind = "match file"
-
     filepath: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
                              description="A tracking file; empty: the one that is chosen in the panel")
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
@@ -108,7 +107,6 @@ class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.tick_match"
     bl_label = "Tick Players"
-
     whom: EnumProperty(name="Whom", items=WHOM, default="ALL", description="Who is ticked")
 
     @classmethod
@@ -202,7 +200,6 @@ seconds"""
 
     bl_idname = "beyond_mocap.match_second"
     bl_label = "Go to Match Second"
-
     seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
 
@@ -220,21 +217,19 @@ seconds"""
             expected = f"{typed(shown.shown_start)} to {typed(end)} s"
             raise InputError("match", f"{typed(self.seconds)} s is not shown", expected,
                              "choose From and To around it and press Show Match")
-        body = self.body(scene)
+        body = _body_of(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
-            for other in context.selected_objects:
-                other.select_set(False)
-            body.select_set(True)
-            context.view_layer.objects.active = body
+            window.select_only(context, body)
 
-    def body(self, scene) -> bpy.types.Object | None:
-        """The player's armature; InputError where he is not shown."""
-        known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
-        if self.player and self.player not in known:
-            raise InputError("match", f"{self.player} is not shown", f"one of {', '.join(map(str, known))}",
-                             "tick the player and press Show Match")
-        return known.get(self.player)
+
+def _body_of(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
+    """A player's armature; InputError where the player is not shown."""
+    known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
+    if player not in known:
+        raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
+                         "tick the player and press Show Match")
+    return known[player]
 
 
 def _last(scene: bpy.types.Scene) -> int:
@@ -254,7 +249,6 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.match_camera"
     bl_label = "Match Camera"
-
     which: EnumProperty(name="Which", items=WHICH, default="STAND", description="The camera to look through")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the chosen one")
 
@@ -278,18 +272,13 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     def who(self, context) -> bpy.types.Object:
         """The armature that is meant: named, selected, or chosen in the list."""
-        shown = {thing.get(ours.PLAYER): thing for thing in ours.bodies(context.scene)}
-        active = context.active_object
+        shown, active = ours.bodies(context.scene), context.active_object
         if not self.player and active is not None:
             active = active.parent if active.type == "MESH" else active
-            if active in shown.values() and active.select_get():
+            if active in shown and active.select_get():
                 return active
         chosen = active_of(context.scene.beyond_mocap_match)
-        wanted = self.player or (chosen.feed_id if chosen is not None else next(iter(shown)))
-        if wanted not in shown:
-            raise InputError("match", f"{wanted} is not shown", f"one of {', '.join(map(str, shown))}",
-                             "tick the player and press Show Match")
-        return shown[wanted]
+        return _body_of(context.scene, self.player or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER)))
 
 
 def _look_through(context, area: bpy.types.Area) -> None:
@@ -309,7 +298,6 @@ scene stays as it is"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")

@@ -32,7 +32,6 @@ stands, which becomes his body"""
 
     bl_idname = "beyond_mocap.passes_list"
     bl_label = "Players and Passes"
-
     rows: EnumProperty(name="List", items=ROWS, options={"SKIP_SAVE"}, description="Which list")
     what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="What to do")
 
@@ -141,7 +140,6 @@ flight leaves one body at its strike and arrives at the next one at his"""
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
     kind = "passes"
-
     live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
                        description="Whether an edit asked for it: what is wrong is told in the panel")
 
@@ -207,7 +205,6 @@ their bodies"""
 
     bl_idname = "beyond_mocap.passes_sample"
     bl_label = "Sample Scene"
-
     sample: EnumProperty(name="Sample", items=SAMPLES, description="Which one")
 
     def do(self, context):
@@ -222,15 +219,12 @@ class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.passes_from_json"
     bl_label = "Scene from File"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
         """Read it, fill the lists."""
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one SCENE.json")
-        order.fill(context, scene_json.read_scene(chosen[0]))
+        path = self.chosen_one("one SCENE.json")
+        order.fill(context, scene_json.read_scene(path))
 
 
 class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
@@ -240,7 +234,6 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
     bl_label = "Scene to File"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):

@@ -38,7 +38,6 @@ back"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
-
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
@@ -98,7 +97,6 @@ curve before is removed if it was made here and nobody else rides it"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"
-
     shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Where the new curve runs")
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
@@ -139,7 +137,6 @@ as little as it takes. Of two or more selected riders only those give way; other
 
     bl_idname = "beyond_mocap.path_apart"
     bl_label = "Keep Apart"
-
     distance: FloatProperty(name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
                             description="Metres between the middles of two bodies at least")
     delay: FloatProperty(name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2,
@@ -228,7 +225,6 @@ looks"""
 
     bl_idname = "beyond_mocap.nudge_points"
     bl_label = "Nudge Points"
-
     direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
     step: FloatProperty(name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
                         description="Metres to move; 0: the step that is set in the panel Path Editing")

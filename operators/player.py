@@ -27,7 +27,6 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
     filename_ext = ".csv"
-
     filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
     metadata: StringProperty(
         name="Metadata", subtype="FILE_PATH",
@@ -149,7 +148,6 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.choose_player"
     bl_label = "Show Player's Strips"
-
     player: StringProperty(name="Player", options={"SKIP_SAVE"},
                            description="The player's name; empty is the active one")
 

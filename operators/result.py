@@ -36,7 +36,6 @@ Accepted results can be turned from one form into the other"""
 
     bl_idname = "beyond_mocap.accept"
     bl_label = "Accept"
-
     form: EnumProperty(name="As", items=FORMS, default="ACTION", description="What the take becomes")
 
     @classmethod
@@ -94,7 +93,6 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.preview"
     bl_label = "Preview"
-
     number: IntProperty(name="Variant", default=1, min=1, description="Which one, from 1")
 
     @classmethod
@@ -117,7 +115,6 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
 
     bl_idname = "beyond_mocap.error_curves"
     bl_label = "Error Curves"
-
     remove: BoolProperty(name="Remove", options={"SKIP_SAVE"}, description="Take the curves away instead")
 
     @classmethod

@@ -68,7 +68,6 @@ class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
     bl_label = "Save Bone Map"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
@@ -84,7 +83,6 @@ class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
     bl_idname = "beyond_mocap.load_bone_map"
     bl_label = "Load Bone Map"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
@@ -130,7 +128,6 @@ on the ground. What the rig played before is kept as an action"""
 
     bl_idname = "beyond_mocap.bake_to_rig"
     bl_label = "Bake to Rig"
-
     targets: EnumProperty(name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"},
                           description="Which rigs get the motion")
 
@@ -286,7 +283,6 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Form of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
@@ -351,7 +347,6 @@ class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
     bl_label = "Export BVH"
     bl_options = {"REGISTER"}
     filename_ext = ".bvh"
-
     filter_glob: StringProperty(default="*.bvh", options={"HIDDEN"})
 
     @classmethod

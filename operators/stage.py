@@ -17,7 +17,6 @@ class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.add_stage"
     bl_label = "Add Pitch, Light and Camera"
-
     camera: BoolProperty(name="Camera", default=True, description="Add a camera and look through it when rendering")
 
     def do(self, context):
@@ -65,7 +64,6 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
-
     which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
 
     @classmethod

@@ -80,7 +80,6 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.stream_keep"
     bl_label = "Keep Recording"
-
     seconds: FloatProperty(name="Seconds", default=10.0, min=0.1, max=20.0,
                            description="How much of what has just been seen is kept")
 
@@ -100,7 +99,6 @@ the scene plays on meanwhile"""
     bl_idname = "beyond_mocap.stream_play"
     bl_label = "Play Live"
     kind = "live"
-
     holder: StringProperty(name="Holder", description="Who has the ball first; empty: the first one of the list")
 
     @classmethod
@@ -128,7 +126,6 @@ class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.stream_target"
     bl_label = "Pass To"
-
     number: IntProperty(name="Number", default=1, min=1, max=99, description="Of the player in the list, from 1")
 
     def do(self, context):

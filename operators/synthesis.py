@@ -55,7 +55,6 @@ class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.update_live"
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
-
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
     kind: bpy.props.EnumProperty(
         name="Kind", items=(("quick", "Quick", "By a narrow search"),
@@ -80,7 +79,6 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
     bl_idname = "beyond_mocap.cancel"
     bl_label = "Cancel"
     bl_options = {"INTERNAL"}
-
     keep: BoolProperty(
         name="Finish Early", options={"SKIP_SAVE"},
         description="Come to an end with the best that has been found so far; players that wait are left as they are",
@@ -114,7 +112,6 @@ of an accepted result, of a selected span of words, or the preview range. All el
 
     bl_idname = "beyond_mocap.resynthesize_stretch"
     bl_label = "Resynthesize Stretch"
-
     start: FloatProperty(name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
                          description="Second on the track's clock")
     end: FloatProperty(name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
@@ -143,7 +140,6 @@ They are switched by the row of numbers; Accept keeps the one that is shown, the
 
     bl_idname = "beyond_mocap.variants"
     bl_label = "Variants"
-
     count: IntProperty(name="How Many", default=3, min=2, max=9, description="How many takes to choose from")
 
     @classmethod

@@ -131,7 +131,6 @@ goes to the next. Shift-click also brings the body into view"""
 
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"
-
     seconds: FloatProperty(name="Seconds", options={"SKIP_SAVE"},
                            description="Second on the tracking file's clock to go to")
     stops: StringProperty(
@@ -168,10 +167,7 @@ goes to the next. Shift-click also brings the body into view"""
         if body is None or body.name not in context.view_layer.objects:
             return
         if context.view_layer.objects.active is None or context.mode == "OBJECT":
-            for other in context.selected_objects:
-                other.select_set(False)
-            body.select_set(True)
-            context.view_layer.objects.active = body
+            window.select_only(context, body)
         if self.frame_view and not bpy.app.background:
             _bring_into_view(context)
 
@@ -190,7 +186,6 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.go_to_moment"
     bl_label = "Go to Key Moment"
-
     strip: StringProperty(name="Strip", options={"SKIP_SAVE"}, description="The strip whose action has the marker")
     index: IntProperty(name="Index", options={"SKIP_SAVE"}, description="Which marker of the action it is")
 
@@ -286,7 +281,6 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.add_moment"
     bl_label = "Add Key Moment"
-
     words: StringProperty(name="Words", default="kick", description="What happens there; -word for what must not be")
 
     def invoke(self, context, _event):
@@ -308,7 +302,6 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.move_moment"
     bl_label = "Move Key Moment"
-
     frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="By how many frames; 0 moves to the playhead")
 
     def do(self, context):

@@ -26,7 +26,6 @@ playhead on"""
 
     bl_idname = "beyond_mocap.add_span"
     bl_label = "Add Span"
-
     words: StringProperty(name="Words", default="running", description="What is done there; -word for what must not be")
     start: FloatProperty(
         name="From", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
@@ -147,7 +146,6 @@ or that the library does not have, are told while you type"""
 
     bl_idname = "beyond_mocap.edit_words"
     bl_label = "Edit Words"
-
     words: StringProperty(name="Words", description="What is done; -word for what must not be")
 
     def invoke(self, context, _event):
@@ -250,7 +248,6 @@ seconds"""
     bl_label = "Export Words"
     bl_options = {"REGISTER"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
@@ -271,7 +268,6 @@ clip whose armature is active. Strips that are there are replaced"""
     bl_label = "Import Words"
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     @classmethod
@@ -281,20 +277,18 @@ clip whose armature is active. Strips that are there are replaced"""
 
     def do(self, context):
         """Read the file, then lay the strips."""
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one text of words")
+        path = self.chosen_one("one text of words")
         settings, rig = context.scene.beyond_mocap, context.object
         if recordings.shown_clip(rig):
             motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
-            timeline, whose = read_timeline(chosen[0], motion.fps), rig.name
+            timeline, whose = read_timeline(path, motion.fps), rig.name
             recordings.lay_words(rig, context.scene, motion, timeline)
         else:
             player = active_player(settings)
             start = float(tracks.read_track(settings, player).times[0])
-            timeline, whose = read_timeline(chosen[0], settings.rate, start), player.name
+            timeline, whose = read_timeline(path, settings.rate, start), player.name
             strips.write(context, player, timeline)
-            player.annotation_file = as_setting(str(chosen[0]))
+            player.annotation_file = as_setting(str(path))
         self.report({"INFO"}, f"{whose}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.drawn import FASTEST
-from ..scene.core import channels
+from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player, is_track
 from ..scene.player import dots, drawn_track, pins
@@ -34,10 +34,7 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
         name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
         drawn = drawn_track.create(context, f"{name} curve", context.collection)
         add_player(context, drawn, name)
-        for other in context.selected_objects:
-            other.select_set(False)
-        drawn.select_set(True)
-        context.view_layer.objects.active = drawn
+        window.select_only(context, drawn)
         self.report({"INFO"}, f"{name}: bend the curve in edit mode (Tab), set speeds of its points, then Synthesize")
 
 
@@ -58,7 +55,6 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
 
     bl_idname = "beyond_mocap.track_object"
     bl_label = "Track from Object"
-
     for_active: bpy.props.BoolProperty(name="Active Player",
                                        description="Give it to the active player in the list instead of adding one",
                                        options={"SKIP_SAVE"})
@@ -91,7 +87,6 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
-
     speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2,
                                    description="Metres per second; 0: a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
@@ -133,7 +128,6 @@ with G; time and hold stand in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"
-
     part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="What is held")
     at: bpy.props.EnumProperty(
         name="At", items=(("BODY", "Body", "Where the part is now"), ("CURSOR", "3D Cursor", "At the 3D cursor")),

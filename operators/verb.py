@@ -46,7 +46,6 @@ class ImportVerb(Verb, ImportHelper):
     """A verb that reads files: chosen in the file browser, dropped into a view, or named by a script."""
 
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -62,6 +61,13 @@ class ImportVerb(Verb, ImportHelper):
         if names:
             return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
+
+    def chosen_one(self, expected: str) -> Path:
+        """The one chosen file; InputError where there are none or several."""
+        chosen = self.chosen()
+        if len(chosen) != 1:
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", expected)
+        return chosen[0]
 
 
 class DroppedIntoView:

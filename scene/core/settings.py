@@ -87,7 +87,6 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""
 
     attached_to = ("Scene.beyond_mocap",)
-
     version: IntProperty(name="Version", options={"HIDDEN"},
                          description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet")
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
@@ -111,7 +110,6 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
     """What runs in the background just now; on the window manager, so that undo leaves it alone."""
 
     attached_to = ("WindowManager.beyond_mocap_work",)
-
     kind: StringProperty(description="Name of the running step; empty while nothing runs")
     text: StringProperty(description="What it is doing")
     fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")

@@ -1,5 +1,5 @@
-"""Blender's windows: their editors, and what is hung over them: drawing, the line in the status bar, the clocks of
-operators that run. What of these is still there when the extension is switched off goes with it."""
+"""Blender's windows: their editors, what is selected in them, and what is hung over them: drawing, the line in the
+status bar, the clocks of operators that run. What is still there when the extension is switched off goes with it."""
 
 from __future__ import annotations
 
@@ -64,6 +64,15 @@ def clear() -> None:
     for _, function, _ in list(_drawn):
         undraw(function)
     clear_status()
+
+
+def select_only(context: bpy.types.Context, *things: bpy.types.Object) -> None:
+    """Let these objects be the selected ones, and the first of them active."""
+    for other in context.selected_objects:
+        other.select_set(False)
+    for thing in things:
+        thing.select_set(True)
+    context.view_layer.objects.active = things[0]
 
 
 def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: float) -> bpy.types.Area | None:

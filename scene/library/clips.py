@@ -65,7 +65,6 @@ class BeyondMocapClips(bpy.types.PropertyGroup):
     """The list of clips, and how it is looked through."""
 
     attached_to = ("WindowManager.beyond_mocap_clips",)
-
     folder: StringProperty(description="The setting of the library's folder when the list was filled")
     shown: CollectionProperty(type=BeyondMocapClip, description="The clips that fit what is looked for")
     active: IntProperty(name="Clip", min=0, description="The clip that is described below the list")

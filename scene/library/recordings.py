@@ -14,7 +14,7 @@ import bpy
 
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline, clip_annotations
 from ...beyond_mocap.base.errors import InputError
-from ..core import action, preferences
+from ..core import action, preferences, window
 from ..core.measure import Clock, frames_per_second
 from ..core.settings import absolute
 from ..rigs import armature
@@ -67,10 +67,7 @@ def show_recording(context: bpy.types.Context, motion: "Motion", path: str, dres
     action.write(rig, motion, scene, name=name)
     if dressed:
         body.create(rig, name, SHIRT, collection=context.collection, scene=scene, example=motion)
-    for other in context.selected_objects:
-        other.select_set(False)
-    rig.select_set(True)
-    context.view_layer.objects.active = rig
+    window.select_only(context, rig)
     return rig
 
 

@@ -44,7 +44,6 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 
     attached_to = ("Scene.beyond_mocap_match",)
-
     tracking_file: StringProperty(name="Tracking", description="A provider's tracking of a whole match", **FILE)
     metadata_file: StringProperty(
         name="Metadata", description="The provider's second file; empty: one beside the first whose name fits", **FILE

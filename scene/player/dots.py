@@ -27,7 +27,6 @@ class BeyondMocapDot(bpy.types.PropertyGroup):
     """Which player's dot this is: what a file that it is appended to needs to go on with him."""
 
     attached_to = ("Object.beyond_mocap_dot",)
-
     player: bpy.props.StringProperty(name="Player", description="The player's name")
     tracking_file: bpy.props.StringProperty(name="Tracking", description="The file with the player's positions")
     metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")

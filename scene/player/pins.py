@@ -9,6 +9,7 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.synthesis.plan import Pin
+from ..core import window
 from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
@@ -60,10 +61,7 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
     if target.name in context.view_layer.objects:  # else its collection is excluded
-        for other in context.selected_objects:
-            other.select_set(False)
-        target.select_set(True)
-        context.view_layer.objects.active = target
+        window.select_only(context, target)
     return target
 
 

@@ -25,7 +25,6 @@ class BeyondMocapLanes(bpy.types.PropertyGroup):
     """What an object with annotations knows about all of them."""
 
     attached_to = ("Object.beyond_mocap_lanes",)
-
     clock: StringProperty(name="Clock", description="Start frame, seconds there and frames per second of these strips")
 
 

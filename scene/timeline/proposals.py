@@ -56,7 +56,6 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
     """What was proposed for the clip that an armature shows."""
 
     attached_to = ("Object.beyond_mocap_proposals",)
-
     listed: CollectionProperty(type=BeyondMocapProposal, description="By their first frame")
     active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal that is looked at")
 

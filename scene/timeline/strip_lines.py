@@ -35,7 +35,6 @@ class BeyondMocapLine(bpy.types.PropertyGroup):
     """What an action or a marker was written for. Times are text: Blender's own numbers are too coarse for them."""
 
     attached_to = ("Action.beyond_mocap", "TimelineMarker.beyond_mocap")
-
     kind: EnumProperty(name="Kind", items=KINDS, description="What this stands for in a timeline")
     line: StringProperty(name="Line", description="The exact line of the text form, in seconds")
     shown: StringProperty(name="Shown", description="The name that Blender gave it then; another one means new words")

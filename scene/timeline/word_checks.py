@@ -27,7 +27,6 @@ class BeyondMocapProblems(bpy.types.PropertyGroup):
     """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
 
     attached_to = ("WindowManager.beyond_mocap_problems",)
-
     lines: bpy.props.CollectionProperty(name="Problems", type=BeyondMocapProblem,
                                         description="Everything that was found when words last changed")
 
