@@ -50,11 +50,8 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
     bl_label = "Annotate by Keys"
     keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
                          description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking in step 2 first, and choose a player of the list; or open a clip's words")
-        return bool(name_of(context))
+    needs = ("Import tracking in step 2 first, and choose a player of the list; or open a clip's words",
+             lambda context: bool(name_of(context)))
 
     def do(self, context):
         """Press the keys that a script gives."""
@@ -234,10 +231,7 @@ def _holds(place, event) -> bool:
 class VideoVerb(Verb):
     """A verb about the reference video."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Load a reference video first")
-        return context.scene.beyond_mocap.video.clip is not None
+    needs = "Load a reference video first", lambda context: context.scene.beyond_mocap.video.clip is not None
 
 
 class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
@@ -315,11 +309,7 @@ class BEYOND_MOCAP_OT_remove_video(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.remove_video"
     bl_label = "Remove Reference Video"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("There is no reference video")
-        return context.scene.beyond_mocap.video.clip is not None
+    needs = "There is no reference video", lambda context: context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
         video.release(context.scene)

@@ -48,11 +48,8 @@ from where it lies"""
                            description="Seconds from the strike to the target")
     arrival: IntProperty(name="Frame", default=50, description="Scene frame on which the ball arrives")
     ball: EnumProperty(name="Ball", items=BALLS, default="football", description="What kind of ball it is")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature that strikes, or a ball")
-        return body_meant(context) is not None or ball_meant(context) is not None
+    needs = ("Select an armature that strikes, or a ball",
+             lambda context: body_meant(context) is not None or ball_meant(context) is not None)
 
     def do(self, context):
         """Solve first, then make what is lacking and write."""
@@ -167,10 +164,7 @@ class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
 class HitVerb(Verb):
     """A verb about an armature's strikes."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature with a motion")
-        return subject(context) is not None
+    needs = "Select an armature with a motion", lambda context: subject(context) is not None
 
 
 class BEYOND_MOCAP_OT_hit_analysis(HitVerb, bpy.types.Operator):
@@ -324,11 +318,7 @@ none is added"""
     bl_label = "Accept Touches"
     active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
                          description="Only those of the active player")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Press Solve Ball first")
-        return len(context.scene.beyond_mocap_passes.touches) > 0
+    needs = "Press Solve Ball first", lambda context: len(context.scene.beyond_mocap_passes.touches) > 0
 
     def do(self, context):
         player = active_player(context.scene.beyond_mocap)

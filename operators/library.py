@@ -24,10 +24,7 @@ if TYPE_CHECKING:
 class FolderVerb(BackgroundVerb):
     """A verb about the library's folder."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Choose the library's folder first")
-        return bool(context.scene.beyond_mocap.library_folder)
+    needs = "Choose the library's folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
 
 
 class ClipVerb(Verb):
@@ -36,11 +33,8 @@ class ClipVerb(Verb):
     path: StringProperty(name="Clip", options={"SKIP_SAVE"},
                          description="Below the library's folder; empty: the one chosen in the list")
     dressed: BoolProperty(name="Body", default=True, description="With a low-poly body, not only bones")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("No clip is listed; press Build Library or List Clips first")
-        return clips.active(context.window_manager) is not None
+    needs = ("No clip is listed; press Build Library or List Clips first",
+             lambda context: clips.active(context.window_manager) is not None)
 
     def clip(self, context) -> str:
         """The clip, below the library's folder."""
@@ -242,11 +236,8 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
     bl_label = "Relink Library"
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Choose the library's folder in the field above")
-        return bool(context.scene.beyond_mocap.library_folder)
+    needs = ("Choose the library's folder in the field above",
+             lambda context: bool(context.scene.beyond_mocap.library_folder))
 
     def invoke(self, context, _event):
         """Look beside the file first; ask where nothing is found."""
@@ -292,11 +283,8 @@ were not saved are lost"""
 
     bl_idname = "beyond_mocap.remove_clip"
     bl_label = "Remove Clip"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select the armature of a clip that came from the library's list")
-        return bool(recordings.shown_clip(context.object))
+    needs = ("Select the armature of a clip that came from the library's list",
+             lambda context: bool(recordings.shown_clip(context.object)))
 
     def do(self, context):
         rig = context.object

@@ -22,10 +22,8 @@ from .verb import Verb
 class OpenClipVerb(Verb):
     """A verb about the library clip that the active armature shows."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
-        return bool(recordings.shown_clip(context.object))
+    needs = ("Open a clip with Annotate Clip first, and keep its armature active",
+             lambda context: bool(recordings.shown_clip(context.object)))
 
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
@@ -134,10 +132,8 @@ STATUS = "A, Enter: accept   X: refuse   Up, Down: the one before, the next   Sp
 class ProposalVerb(Verb):
     """A verb about what was proposed for the active clip."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Open a clip with Annotate Clip first, and press Look Through")
-        return context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0
+    needs = ("Open a clip with Annotate Clip first, and press Look Through",
+             lambda context: context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0)
 
 
 class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):

@@ -21,10 +21,7 @@ from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 class OnMarkers:
     """To be mixed into a verb: it is about the cloud of markers that is meant."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select a cloud of markers (Import Markers makes one)")
-        return cloud_meant(context) is not None
+    needs = "Select a cloud of markers (Import Markers makes one)", lambda context: cloud_meant(context) is not None
 
     @staticmethod
     def cloud(context):

@@ -108,11 +108,7 @@ class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.tick_match"
     bl_label = "Tick Players"
     whom: EnumProperty(name="Whom", items=WHOM, default="ALL", description="Who is ticked")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Press Read Match first")
-        return len(context.scene.beyond_mocap_match.players) > 0
+    needs = "Press Read Match first", lambda context: len(context.scene.beyond_mocap_match.players) > 0
 
     @classmethod
     def description(cls, _context, properties):
@@ -188,10 +184,7 @@ the one that is shown"""
 class ShownMatchVerb(Verb):
     """A verb about the match that is shown."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Press Make Match or Show Match first")
-        return bool(ours.bodies(context.scene))
+    needs = "Press Make Match or Show Match first", lambda context: bool(ours.bodies(context.scene))
 
 
 class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
@@ -303,11 +296,7 @@ scene stays as it is"""
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
     pitch: BoolProperty(name="Pitch", default=True, description="Grass, lines and goals, too")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Show a match first")
-        return bool(ours.bodies(context.scene))
+    needs = "Show a match first", lambda context: bool(ours.bodies(context.scene))
 
     def do(self, context):
         path = self.out()

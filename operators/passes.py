@@ -189,11 +189,7 @@ lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
     bl_label = "Clear Scene"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Nothing has been made")
-        return bool(context.scene.beyond_mocap_passes.made_of)
+    needs = "Nothing has been made", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):
         make.clear(context.scene)

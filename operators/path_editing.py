@@ -19,10 +19,7 @@ from .verb import Verb
 class RiderVerb(Verb):
     """A verb about the riders that are meant; greyed, with the reason, where there are none."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
+    needs = "Select an armature that rides a path, or its curve", lambda context: bool(meant(context))
 
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
@@ -144,11 +141,7 @@ as little as it takes. Of two or more selected riders only those give way; other
     detour: FloatProperty(name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
                           description="Metres that a rider may leave its path to the side")
     clear: BoolProperty(name="Clear", description="Only take back the waits and detours of before")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Let an armature ride a path first (Edit Path)")
-        return bool(riders_in(context.scene))
+    needs = "Let an armature ride a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
 
     def do(self, context):
         from ..beyond_mocap.path_editing.apart import Limits
@@ -228,11 +221,7 @@ looks"""
     direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
     step: FloatProperty(name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
                         description="Metres to move; 0: the step that is set in the panel Path Editing")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select a curve and go into edit mode with Tab first")
-        return context.mode == "EDIT_CURVE"
+    needs = "Select a curve and go into edit mode with Tab first", lambda context: context.mode == "EDIT_CURVE"
 
     @classmethod
     def description(cls, _context, properties):

@@ -177,11 +177,9 @@ strips. Files of earlier versions need this once; texts and files stay as they a
 
     bl_idname = "beyond_mocap.place_players"
     bl_label = "Bring to the Timeline"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Every player in the list has strips already")
-        return any(strips.dot_of(player, context.scene) is None for player in context.scene.beyond_mocap.players)
+    needs = ("Every player in the list has strips already",
+             lambda context: any(strips.dot_of(player, context.scene) is None
+                                 for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Read all tracks and words, then place those that could be read, and tell the others."""
@@ -209,11 +207,7 @@ strips come along"""
 
     bl_idname = "beyond_mocap.player_from_dot"
     bl_label = "Add Player from Dot"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select a dot that was appended from another file first")
-        return bool(dots.orphans(context))
+    needs = "Select a dot that was appended from another file first", lambda context: bool(dots.orphans(context))
 
     def do(self, context):
         """A player for each; his strips are laid for this scene's clock."""
@@ -234,11 +228,7 @@ what his track is drawn by stay in the scene, and a preview that he shows is kep
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("The list of players is empty")
-        return active_player(context.scene.beyond_mocap) is not None
+    needs = "The list of players is empty", lambda context: active_player(context.scene.beyond_mocap) is not None
 
     def do(self, context):
         """Remove it and choose its neighbour."""

@@ -37,12 +37,8 @@ Accepted results can be turned from one form into the other"""
     bl_idname = "beyond_mocap.accept"
     bl_label = "Accept"
     form: EnumProperty(name="As", items=FORMS, default="ACTION", description="What the take becomes")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Synthesize first")
-        return any(player.use and (player.take or player.result.state != "NONE")
-                   for player in context.scene.beyond_mocap.players)
+    needs = ("Synthesize first", lambda context: any(player.use and (player.take or player.result.state != "NONE")
+                                                     for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Show those that are not shown yet, then keep all."""
@@ -70,11 +66,9 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.discard"
     bl_label = "Discard"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("No preview is shown: Synthesize shows one")
-        return any(player.use and player.result.state == "PREVIEW" for player in context.scene.beyond_mocap.players)
+    needs = ("No preview is shown: Synthesize shows one",
+             lambda context: any(player.use and player.result.state == "PREVIEW"
+                                 for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         players = [player for player in self.chosen(context) if player.result.state == "PREVIEW"]
@@ -94,11 +88,8 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.preview"
     bl_label = "Preview"
     number: IntProperty(name="Variant", default=1, min=1, description="Which one, from 1")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("No variants: press Variants first")
-        return any(player.result.variants for player in context.scene.beyond_mocap.players)
+    needs = ("No variants: press Variants first",
+             lambda context: any(player.result.variants for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Show it on the named player, or the active one."""

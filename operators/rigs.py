@@ -26,10 +26,7 @@ from .verb import ExportVerb, Verb
 class MapVerb(Verb):
     """A verb about the chosen rig's map."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Choose a rig first")
-        return context.scene.beyond_mocap.rig.target is not None
+    needs = "Choose a rig first", lambda context: context.scene.beyond_mocap.rig.target is not None
 
 
 class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
@@ -99,11 +96,7 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.use_selected_rig"
     bl_label = "Use Active Armature"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select the rig first")
-        return context.object is not None and context.object.type == "ARMATURE"
+    needs = "Select the rig first", lambda context: context.object is not None and context.object.type == "ARMATURE"
 
     def do(self, context):
         """Choose it; its bones are mapped at once."""
@@ -348,11 +341,7 @@ class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
     bl_options = {"REGISTER"}
     filename_ext = ".bvh"
     filter_glob: StringProperty(default="*.bvh", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature first")
-        return context.object is not None and context.object.type == "ARMATURE"
+    needs = "Select an armature first", lambda context: context.object is not None and context.object.type == "ARMATURE"
 
     def do(self, context):
         """Read the action, write the file."""

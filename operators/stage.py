@@ -65,11 +65,7 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
     which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Press Path Cameras in the panel Path Editing first")
-        return path_cameras.any_in(context.scene)
+    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.any_in(context.scene)
 
     @classmethod
     def description(cls, _context, properties):

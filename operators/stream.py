@@ -20,11 +20,7 @@ Nothing from other machines gets in, and nothing is sent"""
     bl_idname = "beyond_mocap.stream_start"
     bl_label = "Start Stream"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("A stream is listened to already: press Stop Stream first")
-        return receiver.listener() is None
+    needs = "A stream is listened to already: press Stop Stream first", lambda context: receiver.listener() is None
 
     def do(self, context):
         """Bind the port and begin to listen."""
@@ -35,10 +31,7 @@ Nothing from other machines gets in, and nothing is sent"""
 class ListeningVerb(Verb):
     """A verb about the stream that is received."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("No stream is listened to: press Start Stream first")
-        return receiver.listener() is not None
+    needs = "No stream is listened to: press Start Stream first", lambda context: receiver.listener() is not None
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -56,10 +49,7 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
 class PlayingVerb(Verb):
     """A verb about what is played live."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Nothing is played live: press Play Live first")
-        return play.rally() is not None
+    needs = "Nothing is played live: press Play Live first", lambda context: play.rally() is not None
 
 
 class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
@@ -143,11 +133,8 @@ as if you had just done it yourself"""
 
     bl_idname = "beyond_mocap.stream_act"
     bl_label = "Do as Selected"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Press Play Live, and select an armature whose motion has a strike")
-        return play.rally() is not None and subject(context) is not None
+    needs = ("Press Play Live, and select an armature whose motion has a strike",
+             lambda context: play.rally() is not None and subject(context) is not None)
 
     def do(self, context):
         """Find the strike; in a window the answer comes as soon as it is worked out."""

@@ -14,11 +14,7 @@ class AtTarget(BackgroundVerb):
     """What throwing and kicking share."""
 
     act = ""
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select the armature that throws or kicks")
-        return thrower(context) is not None
+    needs = "Select the armature that throws or kicks", lambda context: thrower(context) is not None
 
     def order(self, context):
         """Who, from where, at what, when."""

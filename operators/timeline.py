@@ -21,10 +21,8 @@ from .verb import Verb
 class TimelineVerb(Verb):
     """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking in step 2 first, and bring its players to the timeline")
-        return timeline_subject(context) is not None
+    needs = ("Import tracking in step 2 first, and bring its players to the timeline",
+             lambda context: timeline_subject(context) is not None)
 
     def attempt(self, action):
         """As ever; the lines about words are worked out anew."""
@@ -36,10 +34,7 @@ class TimelineVerb(Verb):
 class WritingVerb(TimelineVerb):
     """A verb that brings the timeline about where there is none yet."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking in step 2 first")
-        return can_have_timeline(context)
+    needs = "Import tracking in step 2 first", lambda context: can_have_timeline(context)
 
 
 class MomentVerb(TimelineVerb):
@@ -92,11 +87,8 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.show_timeline"
     bl_label = "Show Timeline"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking in step 2 first")
-        return any(player.dot for player in context.scene.beyond_mocap.players)
+    needs = ("Import tracking in step 2 first",
+             lambda context: any(player.dot for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Find or open it, show its sidebar and all strips."""

@@ -22,11 +22,7 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
 
     bl_idname = "beyond_mocap.draw_track"
     bl_label = "Draw Track"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        return context.mode == "OBJECT"
+    needs = "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT"
 
     def do(self, context):
         scene = context.scene
@@ -58,11 +54,8 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
     for_active: bpy.props.BoolProperty(name="Active Player",
                                        description="Give it to the active player in the list instead of adding one",
                                        options={"SKIP_SAVE"})
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Choose a curve or a moving object first")
-        return context.object is not None and is_track(None, context.object)
+    needs = ("Choose a curve or a moving object first",
+             lambda context: context.object is not None and is_track(None, context.object))
 
     def do(self, context):
         """Read it, so that what is wrong is told, and take it."""
@@ -91,11 +84,7 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
                                    description="Metres per second; 0: a stop")
     wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds that are waited at a stop")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Choose a drawn curve first")
-        return context.object is not None and context.object.type == "CURVE"
+    needs = "Choose a drawn curve first", lambda context: context.object is not None and context.object.type == "CURVE"
 
     def invoke(self, context, _event):
         points = chosen(context.object)

@@ -17,9 +17,20 @@ class Verb:
     """An operator whose `do(context)` does the work; where it raises, the trouble is reported and nothing has changed.
 
     `do` reads and computes first and touches the scene last, so that a step that fails leaves the scene as it was.
+    needs: what the user is told where the operator is greyed, and a function of the context that is true where it can
+    be called.
     """
 
     bl_options = {"REGISTER", "UNDO"}
+    needs = None
+
+    @classmethod
+    def poll(cls, context):
+        """Whether what it needs is there."""
+        if cls.needs is None or cls.needs[1](context):
+            return True
+        cls.poll_message_set(cls.needs[0])
+        return False
 
     def execute(self, context):
         """Do it now."""
