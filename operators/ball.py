@@ -125,15 +125,10 @@ from the start to see it"""
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
     ball: EnumProperty(name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
                        description="What kind of ball it is")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select a ball that moves")
-        ball = ball_meant(context)
-        if ball is None or ball.animation_data is None or ball.animation_data.action is None:
-            return False
-        cls.poll_message_set("Blender's physics has this ball already")
-        return ball.rigid_body is None
+    needs = ("Select a ball that moves",
+             lambda context: (ball := ball_meant(context)) is not None and ball.animation_data is not None
+             and ball.animation_data.action is not None,
+             "Blender's physics has this ball already", lambda context: ball_meant(context).rigid_body is None)
 
     def do(self, context):
         ball = ball_meant(context)
@@ -150,12 +145,8 @@ class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.ball_from_physics"
     bl_label = "Take Ball Back"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Blender's physics has no ball that is selected")
-        ball = ball_meant(context)
-        return ball is not None and ball.beyond_mocap_aim.handed
+    needs = ("Blender's physics has no ball that is selected",
+             lambda context: (ball := ball_meant(context)) is not None and ball.beyond_mocap_aim.handed)
 
     def do(self, context):
         handover.take_back(context.scene, ball_meant(context))
@@ -242,14 +233,8 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
     settle: IntProperty(name="Settle", default=4, min=1, max=1000,
                         description="Frames within which the ball comes to where it is carried")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature")
-        if subject(context) is None:
-            return False
-        cls.poll_message_set("Select the ball beside the armature")
-        return ball_of(context) is not None
+    needs = ("Select an armature", lambda context: subject(context) is not None,
+             "Select the ball beside the armature", lambda context: ball_of(context) is not None)
 
     def do(self, context):
         body, ball, scene = subject(context), ball_of(context), context.scene
@@ -267,12 +252,8 @@ After the last one the ball plays its own action again"""
     bl_idname = "beyond_mocap.free_ball"
     bl_label = "Free Ball"
     number: IntProperty(name="Stretch", default=-1, min=-1, options={"SKIP_SAVE"}, description="Which one; -1: all")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Nobody carries the ball")
-        ball = ball_of(context)
-        return ball is not None and len(ball.beyond_mocap_ball.holds) > 0
+    needs = ("Nobody carries the ball",
+             lambda context: (ball := ball_of(context)) is not None and len(ball.beyond_mocap_ball.holds) > 0)
 
     def do(self, context):
         ball = ball_of(context)
@@ -288,12 +269,9 @@ its touches proposals for key moments"""
     bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
     kind = "ball"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking in step 2 first")
-        player = active_player(context.scene.beyond_mocap)
-        return player is not None and bool(player.tracking_file)
+    needs = ("Import tracking in step 2 first",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
+             and bool(player.tracking_file))
 
     def order(self, context):
         """What is to be solved."""

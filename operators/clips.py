@@ -118,15 +118,9 @@ turns and kicks to the other side. The motion before is kept as an action"""
 
     bl_idname = "beyond_mocap.mirror"
     bl_label = "Mirror Motion"
-
-    @classmethod
-    def poll(cls, context):
-        body = context.object
-        if body is None or body.type != "ARMATURE":
-            cls.poll_message_set("Select an armature first")
-            return False
-        cls.poll_message_set("The active armature plays no action")
-        return channels.playing(body)[0] is not None
+    needs = ("Select an armature first",
+             lambda context: context.object is not None and context.object.type == "ARMATURE",
+             "The active armature plays no action", lambda context: channels.playing(context.object)[0] is not None)
 
     def do(self, context):
         body = context.object

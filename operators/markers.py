@@ -209,12 +209,8 @@ places of their joints from it"""
 
     bl_idname = "beyond_mocap.set_static"
     bl_label = "Set Static Trial"
-
-    @classmethod
-    def poll(cls, context):
-        active = context.view_layer.objects.active
-        cls.poll_message_set("Make the cloud of the static trial active; there have to be others")
-        return is_cloud(active) and len(clouds(context.scene)) > 1
+    needs = ("Make the cloud of the static trial active; there have to be others",
+             lambda context: is_cloud(context.view_layer.objects.active) and len(clouds(context.scene)) > 1)
 
     def do(self, context):
         static = context.view_layer.objects.active

@@ -14,7 +14,7 @@ from ..scene.core.settings import as_setting
 from ..scene.match import cameras, child, load, order, ours, show
 from ..scene.match.settings import active_of, typed
 from ..scene.rigs import export, rig
-from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
+from .verb import NEEDS_LIBRARY, BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85
 """Of the bar, the share of making where a match is made and shown."""
@@ -130,14 +130,8 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
     bl_label = "Make Match"
     kind = "match"
     left = "cancelled; what is finished is kept, and pressed again it goes on there"
-
-    @classmethod
-    def poll(cls, context):
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Choose a tracking file of a match, or drop one into the view, first")
-        return bool(context.scene.beyond_mocap_match.tracking_file)
+    needs = (*NEEDS_LIBRARY, "Choose a tracking file of a match, or drop one into the view, first",
+             lambda context: bool(context.scene.beyond_mocap_match.tracking_file))
 
     def order(self, context):
         """The command line, and what is shown of its results."""
@@ -161,15 +155,8 @@ the one that is shown"""
     bl_idname = "beyond_mocap.show_match"
     bl_label = "Show Match"
     kind = "match"
-
-    @classmethod
-    def poll(cls, context):
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Press Make Match, or choose the folder of a made match, first")
-        match = context.scene.beyond_mocap_match
-        return bool(match.folder or match.made)
+    needs = (*NEEDS_LIBRARY, "Press Make Match, or choose the folder of a made match, first",
+             lambda context: bool((match := context.scene.beyond_mocap_match).folder or match.made))
 
     def order(self, context):
         wanted = order.wanted(context.scene, order.folder_to_show(context.scene))

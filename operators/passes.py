@@ -142,12 +142,9 @@ flight leaves one body at its strike and arrives at the next one at his"""
     kind = "passes"
     live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
                        description="Whether an edit asked for it: what is wrong is told in the panel")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Add players and passes, or take a sample")
-        settings = context.scene.beyond_mocap_passes
-        return len(settings.players) > 1 and len(settings.passes) > 0
+    needs = ("Add players and passes, or take a sample",
+             lambda context: len((settings := context.scene.beyond_mocap_passes).players) > 1
+             and len(settings.passes) > 0)
 
     def order(self, context):
         """What is to be made."""

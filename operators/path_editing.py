@@ -13,7 +13,7 @@ from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import curve, keep_apart, measure, riders
 from ..scene.path_editing.settings import choose, meant
 from ..scene.path_editing.settings import riders as riders_in
-from .verb import Verb
+from .verb import NEEDS_NO_EDITING, Verb
 
 
 class RiderVerb(Verb):
@@ -39,14 +39,8 @@ back"""
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
     straight: BoolProperty(name="Straight", description="A straight line, as long, instead of the original path")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature with a motion, and a curve if it is to ride that one")
-        return bool(bodies(context))
+    needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and a curve if it is to ride that one",
+             lambda context: bool(bodies(context)))
 
     def do(self, context):
         """Curve and motion, and the curve active."""
@@ -98,14 +92,8 @@ curve before is removed if it was made here and nobody else rides it"""
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
+    needs = (*NEEDS_NO_EDITING, "Select an armature that rides a path, or its curve",
+             lambda context: bool(meant(context)))
 
     def do(self, context):
         """The curve, which becomes active."""

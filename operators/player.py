@@ -150,15 +150,8 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
     bl_label = "Show Player's Strips"
     player: StringProperty(name="Player", options={"SKIP_SAVE"},
                            description="The player's name; empty is the active one")
-
-    @classmethod
-    def poll(cls, context):
-        """There is a player, and objects can be selected."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the mode that you are in first")
-            return False
-        cls.poll_message_set("Import tracking in step 2 first")
-        return len(context.scene.beyond_mocap.players) > 0
+    needs = ("Leave the mode that you are in first", lambda context: context.mode == "OBJECT",
+             "Import tracking in step 2 first", lambda context: len(context.scene.beyond_mocap.players) > 0)
 
     def do(self, context):
         settings = context.scene.beyond_mocap

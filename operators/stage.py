@@ -9,7 +9,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core import window
 from ..scene.path_editing.settings import meant, riders
 from ..scene.stage import path_cameras, stage
-from .verb import Verb
+from .verb import NEEDS_NO_EDITING, Verb
 
 
 class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
@@ -29,15 +29,8 @@ behind the active one. Pressed again it lays only those anew that nobody has mov
 
     bl_idname = "beyond_mocap.path_cameras"
     bl_label = "Path Cameras"
-
-    @classmethod
-    def poll(cls, context):
-        """Somebody rides a path; edit mode has an undo of its own, which knows nothing of cameras."""
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature and press Edit Path first")
-        return bool(riders(context.scene))
+    needs = (*NEEDS_NO_EDITING,  # edit mode has an undo of its own, which knows nothing of cameras
+             "Select an armature and press Edit Path first", lambda context: bool(riders(context.scene)))
 
     def do(self, context):
         """Look at all of them, and lay the cameras."""

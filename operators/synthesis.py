@@ -12,6 +12,7 @@ from ..scene.core import background, session
 from ..scene.core.settings import active_player
 from ..scene.result import freshness, orders, plans, queue
 from .turns import TurnsVerb
+from .verb import NEEDS_LIBRARY
 
 
 class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
@@ -30,13 +31,8 @@ After the file was opened again the take is made again as it was"""
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"
     kind = "update"
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        cls.poll_message_set("Synthesize first")
-        return any(player.use and player.take for player in context.scene.beyond_mocap.players)
+    needs = (*TurnsVerb.needs, "Synthesize first",
+             lambda context: any(player.use and player.take for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
         """Where something is out of date about some of the players, only those; the others stay untouched. Drawn tracks
@@ -116,11 +112,7 @@ of an accepted result, of a selected span of words, or the preview range. All el
                          description="Second on the track's clock")
     end: FloatProperty(name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
                        description="Second on the track's clock; 0: as selected")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Synthesize first")
-        return any(player.take for player in context.scene.beyond_mocap.players)
+    needs = "Synthesize first", lambda context: any(player.take for player in context.scene.beyond_mocap.players)
 
     def wanted(self, context):
         """The seconds that were named, or those of what is selected."""
@@ -141,14 +133,8 @@ They are switched by the row of numbers; Accept keeps the one that is shown, the
     bl_idname = "beyond_mocap.variants"
     bl_label = "Variants"
     count: IntProperty(name="How Many", default=3, min=2, max=9, description="How many takes to choose from")
-
-    @classmethod
-    def poll(cls, context):
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Import tracking and choose a player in step 2 first")
-        return active_player(context.scene.beyond_mocap) is not None
+    needs = (*NEEDS_LIBRARY, "Import tracking and choose a player in step 2 first",
+             lambda context: active_player(context.scene.beyond_mocap) is not None)
 
     def wanted(self, context):
         """The active player."""

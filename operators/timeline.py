@@ -40,12 +40,8 @@ class WritingVerb(TimelineVerb):
 class MomentVerb(TimelineVerb):
     """A verb for the picked key moment."""
 
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
-        cls.poll_message_set("Pick a key moment first: click its name in the NLA editor or in the list")
-        return is_picked(timeline_subject(context))
+    needs = (*TimelineVerb.needs, "Pick a key moment first: click its name in the NLA editor or in the list",
+             lambda context: is_picked(timeline_subject(context)))
 
 
 def is_picked(target: bpy.types.Object) -> bool:

@@ -124,14 +124,9 @@ with G; time and hold stand in the list of pins"""
     )
     hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
                                   description="Seconds for which it stays there")
-
-    @classmethod
-    def poll(cls, context):
-        if active_player(context.scene.beyond_mocap) is None:
-            cls.poll_message_set("Import tracking or draw a track in step 2 first")
-            return False
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        return context.mode == "OBJECT"
+    needs = ("Import tracking or draw a track in step 2 first",
+             lambda context: active_player(context.scene.beyond_mocap) is not None,
+             "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT")
 
     def do(self, context):
         """Find the place, refuse a second pin of the part at that time, make it."""

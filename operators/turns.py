@@ -21,7 +21,7 @@ from ..scene.player import dots
 from ..scene.result import freshness, orders, plans, preview, quality, queue
 from ..scene.timeline import strips
 from .library import summary
-from .verb import Verb
+from .verb import NEEDS_LIBRARY, Verb
 
 
 def written(context, player, order, result) -> None:
@@ -65,15 +65,8 @@ class TurnsVerb(Verb):
 
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only this one; empty: all ticked players")
     kind = "whole"
-
-    @classmethod
-    def poll(cls, context):
-        settings = context.scene.beyond_mocap
-        if not settings.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Import tracking and tick a player in step 2 first")
-        return any(player.use for player in settings.players)
+    needs = (*NEEDS_LIBRARY, "Import tracking and tick a player in step 2 first",
+             lambda context: any(player.use for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
         """The named player, or every ticked one."""

@@ -12,25 +12,30 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, window
 from ..scene.rigs import export
 
+NEEDS_LIBRARY = ("Choose the library's folder in step 1 first",
+                 lambda context: bool(context.scene.beyond_mocap.library_folder))
+NEEDS_NO_EDITING = "Leave edit mode first (Tab)", lambda context: context.mode in {"OBJECT", "POSE"}
+
 
 class Verb:
     """An operator whose `do(context)` does the work; where it raises, the trouble is reported and nothing has changed.
 
     `do` reads and computes first and touches the scene last, so that a step that fails leaves the scene as it was.
     needs: what the user is told where the operator is greyed, and a function of the context that is true where it can
-    be called.
+    be called; as many pairs of these as there are, asked in turn.
     """
 
     bl_options = {"REGISTER", "UNDO"}
-    needs = None
+    needs = ()
 
     @classmethod
     def poll(cls, context):
         """Whether what it needs is there."""
-        if cls.needs is None or cls.needs[1](context):
-            return True
-        cls.poll_message_set(cls.needs[0])
-        return False
+        for message, is_met in zip(cls.needs[::2], cls.needs[1::2]):
+            if not is_met(context):
+                cls.poll_message_set(message)
+                return False
+        return True
 
     def execute(self, context):
         """Do it now."""
