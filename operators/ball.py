@@ -277,9 +277,7 @@ its touches proposals for key moments"""
         """What is to be solved."""
         return tracked.order_of(context.scene)
 
-    @staticmethod
-    def work(order, progress, cancelled, hurry):
-        return tracked.work(order, progress, cancelled, hurry)
+    work = staticmethod(tracked.work)
 
     def apply(self, scene, solved):
         """The ball, and the list of touches."""

@@ -152,9 +152,7 @@ flight leaves one body at its strike and arrives at the next one at his"""
             examples.forget()
         return make.order_of(context.scene)
 
-    @staticmethod
-    def work(order, progress, cancelled, hurry):
-        return make.work(order, progress, cancelled, hurry)
+    work = staticmethod(make.work)
 
     def apply(self, scene, result):
         """Bodies and ball; what is shown is what was ordered."""

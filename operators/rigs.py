@@ -197,13 +197,9 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.unbake"
     bl_label = "Remove Bake"
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("The chosen rig plays nothing that was baked here")
-        target = context.scene.beyond_mocap.rig.target
-        playing = channels.playing(target)[0] if target is not None else None
-        return playing is not None and bool(playing.get(bake_record.MARK))
+    needs = ("The chosen rig plays nothing that was baked here",
+             lambda context: (target := context.scene.beyond_mocap.rig.target) is not None
+             and bool((channels.playing(target)[0] or {}).get(bake_record.MARK)))
 
     def do(self, context):
         bake_record.remove(context.scene.beyond_mocap.rig.target)
@@ -215,8 +211,7 @@ tolerances below"""
 
     bl_idname = "beyond_mocap.reduce_keys"
     bl_label = "Leave Out Keys"
-
-    poll = BEYOND_MOCAP_OT_unbake.poll
+    needs = BEYOND_MOCAP_OT_unbake.needs
 
     def do(self, context):
         """Fewer keys, told how many."""
@@ -284,13 +279,9 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
     own_rate: BoolProperty(name="Own Rate", default=False, description="At the rate that was synthesized")
     deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave controls out")
     meshes: BoolProperty(name="Meshes", default=True, description="Export the meshes that the armature moves, too")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Synthesize and accept first, or select an armature that moves")
-        settings = context.scene.beyond_mocap
-        return bool(settings.players) or settings.rig.target is not None or any(
-            one.type == "ARMATURE" for one in context.selected_objects)
+    needs = ("Synthesize and accept first, or select an armature that moves",
+             lambda context: bool((settings := context.scene.beyond_mocap).players) or settings.rig.target is not None
+             or any(one.type == "ARMATURE" for one in context.selected_objects))
 
     def invoke(self, context, event):
         """The panel's choices, then the file browser."""

@@ -90,12 +90,9 @@ the scene plays on meanwhile"""
     bl_label = "Play Live"
     kind = "live"
     holder: StringProperty(name="Holder", description="Who has the ball first; empty: the first one of the list")
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Add players and passes, or take a sample, under Passing Scene")
-        settings = context.scene.beyond_mocap_passes
-        return len(settings.players) > 1 and len(settings.passes) > 0
+    needs = ("Add players and passes, or take a sample, under Passing Scene",
+             lambda context: len((settings := context.scene.beyond_mocap_passes).players) > 1
+             and len(settings.passes) > 0)
 
     def order(self, context):
         """The passing scene, and who has the ball."""

@@ -20,9 +20,7 @@ class AtTarget(BackgroundVerb):
         """Who, from where, at what, when."""
         return order.order_of(context.scene, thrower(context), self.act)
 
-    @staticmethod
-    def work(order_, progress, cancelled, hurry):
-        return made.work(order_, progress, cancelled, hurry)
+    work = staticmethod(made.work)
 
     def apply(self, scene, result):
         body = scene.objects.get(result.order.body)
@@ -48,11 +46,8 @@ changed as little as it takes. Without a target the 3D cursor is aimed at. Press
 class ThrownVerb(Verb):
     """A verb about the throw or kick that is shown."""
 
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Select an armature that throws or kicks")
-        body = thrower(context)
-        return body is not None and bool(body.beyond_mocap_throw.made)
+    needs = ("Select an armature that throws or kicks",
+             lambda context: (body := thrower(context)) is not None and bool(body.beyond_mocap_throw.made))
 
 
 class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):

@@ -201,12 +201,9 @@ text. Strips and key moments that are there now are replaced"""
 
     bl_idname = "beyond_mocap.read_words"
     bl_label = "Words from Text or File"
-
-    @classmethod
-    def poll(cls, context):
-        player = active_player(context.scene.beyond_mocap)
-        cls.poll_message_set("Import tracking, and choose a file or text with words in step 2 first")
-        return player is not None and (player.annotation_text is not None or bool(player.annotation_file))
+    needs = ("Import tracking, and choose a file or text with words in step 2 first",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
+             and (player.annotation_text is not None or bool(player.annotation_file)))
 
     def do(self, context):
         """Read all of it, then lay the strips."""
@@ -269,11 +266,9 @@ clip whose armature is active. Strips that are there are replaced"""
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        cls.poll_message_set("Import tracking first: words belong to a player")
-        return bool(recordings.shown_clip(context.object)) or active_player(context.scene.beyond_mocap) is not None
+    needs = ("Import tracking first: words belong to a player",
+             lambda context: bool(recordings.shown_clip(context.object))
+             or active_player(context.scene.beyond_mocap) is not None)
 
     def do(self, context):
         """Read the file, then lay the strips."""

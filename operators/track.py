@@ -150,12 +150,8 @@ class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.remove_pin"
     bl_label = "Remove Pin"
-
-    @classmethod
-    def poll(cls, context):
-        player = active_player(context.scene.beyond_mocap)
-        cls.poll_message_set("The active player has no pins")
-        return player is not None and len(player.pins) > 0
+    needs = ("The active player has no pins",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
 
     def do(self, context):
         """Remove it and choose its neighbour."""
