@@ -17,10 +17,8 @@ from ..scene.timeline.annotating import do, held, name_of, now, type_keys
 from ..scene.timeline.video import drive
 from .verb import Verb
 
-SPACES = {
-    "VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
-    "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor,
-}
+SPACES = {"VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
+          "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor}
 DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 KEYS = {
     **{name: str(digit) for digit, name in enumerate(DIGITS)},
@@ -33,10 +31,8 @@ KEYS = {
 }
 LOWEST = 10.0  # letters; a lower editor has no room for the menu, and it is drawn in the largest one
 REPEATING = {"EARLIER", "LATER", "PREVIOUS", "NEXT"}
-STATUS = (
-    "1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
-    "X: remove   H: hide the list   Space: play   Esc: leave"
-)
+STATUS = ("1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
+          "X: remove   H: hide the list   Space: play   Esc: leave")
 
 _menu: dict = {}  # what is drawn: the box, in which region and for which (by pointer), the word under the mouse
 _running: list[bool] = []  # not empty while the user annotates

@@ -138,11 +138,9 @@ def mirrored_in_place(motion: Motion) -> Motion:
     return place(twin, turn, offset)
 
 
-WHICH = (
-    ("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
-    ("SHOWN", "Clips Shown", "All clips that the library's list shows now"),
-    ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"),
-)
+WHICH = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
+         ("SHOWN", "Clips Shown", "All clips that the library's list shows now"),
+         ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,18 +114,14 @@ yours to add"""
         self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to look through")
 
 
-WHAT = (
-    ("ACCEPT", "Accept", "Put it among the clip's words, and go to the next one"),
-    ("REFUSE", "Refuse", "Leave it out, and go to the next one"),
-    ("NEXT", "Next", "Look at the next one"),
-    ("PREVIOUS", "Previous", "Look at the one before"),
-    ("ACCEPT_ALL", "Accept All", "Accept all that are still open"),
-    ("REFUSE_ALL", "Refuse All", "Refuse all that are still open"),
-)
-KEYS = {
-    "A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
-    "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS",
-}
+WHAT = (("ACCEPT", "Accept", "Put it among the clip's words, and go to the next one"),
+        ("REFUSE", "Refuse", "Leave it out, and go to the next one"),
+        ("NEXT", "Next", "Look at the next one"),
+        ("PREVIOUS", "Previous", "Look at the one before"),
+        ("ACCEPT_ALL", "Accept All", "Accept all that are still open"),
+        ("REFUSE_ALL", "Refuse All", "Refuse all that are still open"))
+KEYS = {"A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
+        "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS"}
 STATUS = "A, Enter: accept   X: refuse   Up, Down: the one before, the next   Space: play   Esc: leave"
 
 

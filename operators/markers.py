@@ -38,10 +38,8 @@ class OnMarkers:
         return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
 
 
-UP = (
-    ("AUTO", "Found", "As the file says, or heads above feet"),
-    *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")),
-)
+UP = (("AUTO", "Found", "As the file says, or heads above feet"),
+      *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")))
 
 
 class BEYOND_MOCAP_OT_import_markers(ImportVerb, bpy.types.Operator):

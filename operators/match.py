@@ -96,10 +96,8 @@ def _size(path: Path) -> int:
     return path.stat().st_size if path.is_file() else 0
 
 
-WHOM = (
-    ("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
-    ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"),
-)
+WHOM = (("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
+        ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"))
 
 
 class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
@@ -218,10 +216,8 @@ def _last(scene: bpy.types.Scene) -> int:
     return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))
 
 
-WHICH = (
-    ("STAND", "Broadcast", "From the stand, following the ball"),
-    ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"),
-)
+WHICH = (("STAND", "Broadcast", "From the stand, following the ball"),
+         ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"))
 
 
 class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):

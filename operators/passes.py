@@ -18,10 +18,8 @@ from ..scene.passes.settings import SAMPLES
 from .verb import BackgroundVerb, ImportVerb, Verb
 
 ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
-WHAT = (
-    ("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
-    ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"),
-)  # fmt: skip
+WHAT = (("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
+        ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"))
 ACTIVE = {"players": "active_player", "passes": "active_pass"}
 RING = 3.0  # metres from the 3D cursor at which players are added
 

@@ -186,18 +186,11 @@ again"""
         riders.back_to(context, chosen)
 
 
-DIRECTIONS = (
-    ("LEFT", "Left", "Along -X", "TRIA_LEFT", 0),
-    ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
-    ("FORTH", "Forth", "Along Y", "TRIA_UP", 2),
-    ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
-    ("UP", "Up", "Along Z", "SORT_DESC", 4),
-    ("DOWN", "Down", "Along -Z", "SORT_ASC", 5),
-)
-AXES = {
-    "LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
-    "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0),
-}
+DIRECTIONS = (("LEFT", "Left", "Along -X", "TRIA_LEFT", 0), ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
+              ("FORTH", "Forth", "Along Y", "TRIA_UP", 2), ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
+              ("UP", "Up", "Along Z", "SORT_DESC", 4), ("DOWN", "Down", "Along -Z", "SORT_ASC", 5))
+AXES = {"LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
+        "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0)}
 
 
 class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):

@@ -32,12 +32,10 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; where empty, one beside the tracking file whose name fits is taken",
     )
-    provider: EnumProperty(
-        name="Provider",
-        items=[("AUTO", "Guess", "By what the file looks like")]
-        + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
-        description="Whose form the file has",
-    )
+    provider: EnumProperty(name="Provider",
+                           items=[("AUTO", "Guess", "By what the file looks like")]
+                           + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
+                           description="Whose form the file has")
 
     def paths(self) -> list[str]:
         """The chosen files, without the words that lie beside a chosen CSV and come along with it."""

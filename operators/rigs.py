@@ -104,15 +104,10 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
         context.scene.beyond_mocap.rig.target = context.object
 
 
-TARGETS = (
-    ("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
-    ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
-    (
-        "PLAYERS",
-        "All Ticked Players",
-        "Each ticked player's motion onto that player's rig, or a copy of the chosen one",
-    ),
-)
+TARGETS = (("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
+           ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
+           ("PLAYERS", "All Ticked Players",
+            "Each ticked player's motion onto that player's rig, or a copy of the chosen one"))
 
 
 class BEYOND_MOCAP_OT_bake_to_rig(Verb, bpy.types.Operator):

@@ -40,14 +40,12 @@ behind the active one. Pressed again it lays only those anew that nobody has mov
             self.report({"INFO"}, f"kept as you have changed them: {', '.join(kept)}")
 
 
-WHICH = (
-    ("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
-    ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
-    ("SIDE", "Side", "From the side, the path across the picture"),
-    ("QUARTER", "Quarter", "From three quarters, a little above"),
-    ("BEHIND", "Behind", "Behind the body, following it"),
-    ("FREE", "Free View", "The view as it was before, and the scene's own camera"),
-)
+WHICH = (("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
+         ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
+         ("SIDE", "Side", "From the side, the path across the picture"),
+         ("QUARTER", "Quarter", "From three quarters, a little above"),
+         ("BEHIND", "Behind", "Behind the body, following it"),
+         ("FREE", "Free View", "The view as it was before, and the scene's own camera"))
 VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera turns a view
 _free: dict[int, tuple] = {}  # by the area's pointer: its VIEW before the first of these cameras
 

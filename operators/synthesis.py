@@ -52,11 +52,9 @@ class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
-    kind: bpy.props.EnumProperty(
-        name="Kind", items=(("quick", "Quick", "By a narrow search"),
-                            ("whole", "Whole", "As well as can be, with figures")),
-        description="How it is made",
-    )
+    kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "By a narrow search"),
+                                                     ("whole", "Whole", "As well as can be, with figures")),
+                                 description="How it is made")
 
     def wanted(self, context):
         """The one player, from his take."""

@@ -30,13 +30,11 @@ def written(context, player, order, result) -> None:
     context.scene.beyond_mocap.library_holds = summary(result.library)
     shown = []
     for one in result.takes:
-        lines = {
-            "quality": quality.quality_lines(one.report),
-            "moments": quality.moment_lines(one.report),
-            "warnings": quality.warning_lines(one.report, order.warnings, result.library.notes),
-            "recipe": json.dumps(one.recipe),
-            "made_of": json.dumps(result.made_of),
-        }
+        lines = {"quality": quality.quality_lines(one.report),
+                 "moments": quality.moment_lines(one.report),
+                 "warnings": quality.warning_lines(one.report, order.warnings, result.library.notes),
+                 "recipe": json.dumps(one.recipe),
+                 "made_of": json.dumps(result.made_of)}
         shown.append((session.keep_take(one.plan, one.take, one.report), lines))
     preview.show(context, player, *shown[0])
     if player.drawn_track is not None:

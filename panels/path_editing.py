@@ -13,10 +13,8 @@ from ..scene.core.settings import active_player
 from ..scene.path_editing.settings import meant
 from .tab import Step, figures, paragraph, section, split
 
-OVERLAYS = {
-    "path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
-    "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED",
-}
+OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
+            "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
 CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
 LOOKED = "beyond_mocap_path_camera"  # custom property of our cameras: which one it is
 NUDGES = (

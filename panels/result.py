@@ -7,11 +7,9 @@ import bpy
 from ..scene.core.settings import active_player
 from .tab import Step, figures, paragraph, part, wrapped
 
-STATES = {
-    "NONE": ("Nothing is shown", "BLANK1"),
-    "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
-    "ACCEPTED": ("Accepted", "CHECKMARK"),
-}
+STATES = {"NONE": ("Nothing is shown", "BLANK1"),
+          "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
+          "ACCEPTED": ("Accepted", "CHECKMARK")}
 MENDS = {  # what the button says that brings a player up to date
     "update": ("Update", "FILE_REFRESH"),
     "build_library": ("Build Library", "ASSET_MANAGER"),

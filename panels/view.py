@@ -7,11 +7,9 @@ import bpy
 from ..scene.core.settings import active_player
 from .tab import Step
 
-ICONS = {
-    "track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
-    "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
-    "shots": "CON_TRACKTO",
-}
+ICONS = {"track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
+         "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
+         "shots": "CON_TRACKTO"}
 
 
 class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):

@@ -28,13 +28,11 @@ from ..core.settings import absolute
 if TYPE_CHECKING:
     from ...beyond_mocap.library.listing import Listed
 
-ORDERS = (
-    ("NAME", "Name", "By folder and name"),
-    ("WORDS", "Words", "By key moment or gait"),
-    ("SECONDS", "Length", "Longest first"),
-    ("SPEED", "Speed", "Fastest first"),
-    ("QUALITY", "Quality", "Best first"),
-)
+ORDERS = (("NAME", "Name", "By folder and name"),
+          ("WORDS", "Words", "By key moment or gait"),
+          ("SECONDS", "Length", "Longest first"),
+          ("SPEED", "Speed", "Fastest first"),
+          ("QUALITY", "Quality", "Best first"))
 
 SECONDS = 4.0  # between two looks
 
@@ -303,11 +301,9 @@ def _end() -> None:
 
 
 _kept = _Kept()
-_KEYS = {
-    "NAME": lambda clip: clip.path.lower(),
-    "WORDS": lambda clip: (not clip.words, clip.words, clip.path),
-    "SECONDS": lambda clip: (-clip.seconds, clip.path),
-    "SPEED": lambda clip: (-_fast(clip), clip.path),
-    "QUALITY": lambda clip: (clip.mark, clip.path),
-}
+_KEYS = {"NAME": lambda clip: clip.path.lower(),
+         "WORDS": lambda clip: (not clip.words, clip.words, clip.path),
+         "SECONDS": lambda clip: (-clip.seconds, clip.path),
+         "SPEED": lambda clip: (-_fast(clip), clip.path),
+         "QUALITY": lambda clip: (clip.mark, clip.path)}
 WATCHER = Watcher(name="Watching the library", loaded=_after_load, look=_look_again, ends=_end)

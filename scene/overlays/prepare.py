@@ -114,13 +114,11 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     ground = view.played.pelvis if view.wanted is None else figures.track
     skeleton = take.motion.skeleton
     pairs = shapes.figure_pairs(skeleton.parents)
-    meshes = {
-        "track": _track(figures),
-        "footprints": _footprints(footprints(view)),
-        "seams": _seams(view.played.pelvis, take.seams),
-        "moments": _moments(met, take),
-        "speed": _speed(ground, figures),
-    }
+    meshes = {"track": _track(figures),
+              "footprints": _footprints(footprints(view)),
+              "seams": _seams(view.played.pelvis, take.seams),
+              "moments": _moments(met, take),
+              "speed": _speed(ground, figures)}
     return Prepared(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
                     meshes={name: found for name, found in meshes.items() if found},
                     pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
@@ -208,11 +206,9 @@ def _label(strike: "Strike") -> Label:
 def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
     """The pieces, with the reasons of the search where its library is known."""
     last = len(pelvis) - 1
-    return tuple(
-        Piece(take.start_time + start, take.start_time + end,
-              (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
-        for start, end, name, lines in _told(plan, take, library)
-    )
+    return tuple(Piece(take.start_time + start, take.start_time + end,
+                       (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
+                 for start, end, name, lines in _told(plan, take, library))
 
 
 def _told(plan: "Plan", take: "Take", library: "Library | None"):

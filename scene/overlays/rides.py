@@ -64,12 +64,10 @@ def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> l
         found.append(Item((ridden, "path"), lambda: new_path(ridden, shown.line), world))
     if "path_residuals" in on:
         origin = source.moving.origin
-        found += [
-            Item((source, "residuals"), lambda: residuals(source.motion, origin, ORIGINAL), world),
-            Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world),
-            Item((source, "residual", was), lambda: residual(source.motion, origin, was, ORIGINAL), world),
-            Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world),
-        ]
+        found += [Item((source, "residuals"), lambda: residuals(source.motion, origin, ORIGINAL), world),
+                  Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world),
+                  Item((source, "residual", was), lambda: residual(source.motion, origin, was, ORIGINAL), world),
+                  Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world)]
     if "path_ghost" in on:
         found.append(Item((source, "ghost", was), lambda: figure(source, was), world))
     if "path_trackers" in on:

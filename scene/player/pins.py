@@ -13,13 +13,11 @@ from ..core import window
 from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
-PARTS = (
-    ("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
-    ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
-    ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
-    ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
-    ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4),
-)
+PARTS = (("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
+         ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
+         ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
+         ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
+         ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4))
 SIZE = 0.12  # metres
 AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
 

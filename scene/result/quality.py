@@ -172,10 +172,8 @@ def _error_values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
     figures = per_frame(View(played_from_take(take), made.plan.track, take.timeline, library))
     piece = np.zeros(len(take.motion))
     piece[np.asarray(take.seams, int)] = 1.0
-    rows = (
-        100.0 * figures.root_error, *(100.0 * figures.slide.T), *(100.0 * figures.correction.T), figures.jerk,
-        figures.speed_gap, np.cumsum(piece) % 2.0,
-    )  # fmt: skip
+    rows = (100.0 * figures.root_error, *(100.0 * figures.slide.T), *(100.0 * figures.correction.T), figures.jerk,
+            figures.speed_gap, np.cumsum(piece) % 2.0)
     return np.nan_to_num(np.array(rows))
 
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-STATES = (
-    ("NONE", "None", "Nothing has been made"),
-    ("PREVIEW", "Preview", "A take is shown; Accept keeps it, Discard brings back what was there"),
-    ("ACCEPTED", "Accepted", "A take has been kept"),
-)
+STATES = (("NONE", "None", "Nothing has been made"),
+          ("PREVIEW", "Preview", "A take is shown; Accept keeps it, Discard brings back what was there"),
+          ("ACCEPTED", "Accepted", "A take has been kept"))
 
 
 class BeyondMocapBefore(bpy.types.PropertyGroup):

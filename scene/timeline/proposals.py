@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 SAME = 0.1
 """Seconds within which two key moments are the same one."""
 
-STATES = (
-    ("OPEN", "Open", "Nobody has looked at it yet"),
-    ("ACCEPTED", "Accepted", "It is among the clip's words"),
-    ("REFUSED", "Refused", "It is not what the clip shows"),
-)
+STATES = (("OPEN", "Open", "Nobody has looked at it yet"),
+          ("ACCEPTED", "Accepted", "It is among the clip's words"),
+          ("REFUSED", "Refused", "It is not what the clip shows"))
 
 
 def _go(group, context):

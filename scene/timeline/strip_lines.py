@@ -19,13 +19,11 @@ from ...beyond_mocap.base.errors import InputError
 from ..core.measure import Clock, nearest_frame
 
 NO_WORDS = "(automatic)"  # the name of a span that says nothing: a strip's name cannot be empty
-KINDS = (
-    ("none", "None", "Nothing of a timeline"),
-    ("span", "Span", "A stretch that is asked for"),
-    ("automatic", "Automatic", "A stretch that a synthesis put in"),
-    ("moments", "Moments", "The lane of key moments"),
-    ("moment", "Moment", "A key moment"),
-)
+KINDS = (("none", "None", "Nothing of a timeline"),
+         ("span", "Span", "A stretch that is asked for"),
+         ("automatic", "Automatic", "A stretch that a synthesis put in"),
+         ("moments", "Moments", "The lane of key moments"),
+         ("moment", "Moment", "A key moment"))
 KEPT = 8192  # lines that are remembered as read: all of a match, since strips are read after every edit
 _MOST_BLANKS = 24
 _NEAR = 1.0 - 1e-3  # frames; what was moved by less still stands where its line says
