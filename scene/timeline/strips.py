@@ -7,12 +7,15 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.annotation import Timeline, parse_timeline, read_timeline
+from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.track import Track
 from ..core.measure import Clock, scene_clock
 from ..core.settings import BeyondMocapPlayer, absolute, active_player
 from ..player import dots
 from ..player.tracks import read_track
 from . import lanes, lay_strips
+from .lanes import PlacedMoment, PlacedSpan
+from .strip_lines import said
 
 
 def read(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> Timeline | None:
@@ -30,6 +33,23 @@ def write(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timel
 def set_automatic(context: bpy.types.Context, player: BeyondMocapPlayer, timeline: Timeline) -> None:
     """Show the automatic spans of a take's filled timeline as dimmed strips, in place of those before."""
     lay_strips.set_automatic(dots.ensure(context, player), timeline, scene_clock(context.scene))
+
+
+def add_span(context: bpy.types.Context, player: BeyondMocapPlayer, start_s: float, end_s: float,
+             words: tuple[str, ...]) -> PlacedSpan:
+    """One more span, in seconds on the track's clock; words as in the text form, "-word" for one that must not be.
+    InputError where it is empty or its words are not of the form."""
+    if end_s <= start_s:
+        raise InputError("span", f"the end {end_s:g} is not after the start {start_s:g}", "START < END")
+    span = said(" ".join(words), start_s, end_s)
+    return lay_strips.add_span(with_lanes(context, player), span, scene_clock(context.scene))
+
+
+def add_moment(context: bpy.types.Context, player: BeyondMocapPlayer, time_s: float,
+               words: tuple[str, ...]) -> PlacedMoment:
+    """One more key moment, picked; InputError where its words are not of the form."""
+    key = said(" ".join(words), time_s)
+    return lay_strips.add_moment(with_lanes(context, player), key, scene_clock(context.scene))
 
 
 def dot_of(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> bpy.types.Object | None:

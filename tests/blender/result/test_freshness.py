@@ -64,8 +64,7 @@ def test_words_of_a_text_stay_the_words(renew, made, ready, scene):  # noqa: F81
 
 def test_words(renew, made, ready, session, scene):  # noqa: F811
     plans, strips = scene("result.plans"), scene("timeline.strips")
-    kick, clock = scene("timeline.strip_lines").said("kick", 9.0), scene("core.measure").scene_clock(bpy.context.scene)
-    scene("timeline.lay_strips").add_moment(strips.with_lanes(bpy.context, made), kick, clock)
+    strips.add_moment(bpy.context, made, 9.0, ("kick",))
     assert "words" in renew().lines
     bpy.ops.beyond_mocap.update()
     assert renew().lines == "" and session.made(made.take).plan.timeline == plans.plan_of(ready, made)[0].timeline

@@ -213,12 +213,12 @@ def test_the_dot_goes_with_its_player(player):
 
 def test_a_dot_that_was_deleted_in_the_view_comes_back_with_its_words(room, player):
     strips, scene = room("timeline.strips"), bpy.context.scene
-    bpy.ops.beyond_mocap.add_span(words="walking", start=7.0, end=8.0)
+    strips.add_span(bpy.context, player, 7.0, 8.0, ("walking",))
     asked, dot = strips.read(player, scene), player.dot
     for collection in dot.users_collection:
         collection.objects.unlink(dot)
     assert strips.read(player, scene) is None
-    bpy.ops.beyond_mocap.add_moment(words="header")
+    strips.add_moment(bpy.context, player, 9.0, ("header",))
     assert player.dot == dot and strips.read(player, scene).spans == asked.spans
     assert len(strips.read(player, scene).keys) == 2
 
@@ -238,7 +238,7 @@ def test_a_first_strip_does_not_put_the_words_of_a_file_out_of_force(room, playe
     player.dot.beyond_mocap_lanes.clock = ""
     strips, scene = room("timeline.strips"), bpy.context.scene
     assert strips.read(player, scene) is None
-    bpy.ops.beyond_mocap.add_span(words="walking -dribble", start=8.0, end=9.0)
+    strips.add_span(bpy.context, player, 8.0, 9.0, ("walking", "-dribble"))
     asked = strips.read(player, scene)
     assert [span.words for span in asked.spans] == [("running",), ("walking",)] and len(asked.keys) == 1
     assert asked.spans[1].avoid == ("dribble",)
