@@ -66,7 +66,8 @@ The first minute is chosen"""
         """Which files. Of those that are dropped together the largest is read, which is the tracking: others are found
         beside it."""
         dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
-        chosen = str(max(dropped, key=_size)) if self.directory and dropped else self.filepath
+        sizes = {path: path.stat().st_size if path.is_file() else 0 for path in dropped}
+        chosen = str(max(dropped, key=sizes.get)) if self.directory and dropped else self.filepath
         return order.reading_order(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
@@ -89,11 +90,6 @@ class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
     bl_label = "Match of all players"
     bl_import_operator = "beyond_mocap.read_match"
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
-
-
-def _size(path: Path) -> int:
-    """Bytes of a file; 0 where there is none."""
-    return path.stat().st_size if path.is_file() else 0
 
 
 WHOM = (("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),

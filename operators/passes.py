@@ -90,8 +90,8 @@ def add_player(context) -> None:
     free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
     if free and not any(row.body == body for row in settings.players):
         place, facing = standing(scene, body)
-        row = order.add_player(context, body.name if not _taken(settings, body.name) else order.free_name(settings),
-                               place, facing)
+        taken = any(row.name == body.name for row in settings.players)
+        row = order.add_player(context, order.free_name(settings) if taken else body.name, place, facing)
         row.body = body
         return
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
@@ -125,10 +125,6 @@ def add_pass(settings) -> None:
     if last is not None:
         row.kind, row.bounces = last.kind, last.bounces
     settings.active_pass = len(settings.passes) - 1
-
-
-def _taken(settings, name: str) -> bool:
-    return any(row.name == name for row in settings.players)
 
 
 class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):

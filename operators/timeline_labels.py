@@ -156,7 +156,8 @@ or that the library does not have, are told while you type"""
 
     def load(self, context):
         """The words that are there now."""
-        self.words = words_of(_item(chosen(timeline_subject(context))))
+        placed = chosen(timeline_subject(context))
+        self.words = words_of(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
 
     def draw(self, context):
         """The words, and what is wrong with them."""
@@ -183,10 +184,6 @@ def chosen(target: bpy.types.Object):
         found = f"no key moment is picked and {len(spans)} spans are selected"
         raise InputError(subject_name(target), found, "one of them", "click the name of a key moment, or one strip")
     return spans[0]
-
-
-def _item(placed):
-    return placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span
 
 
 def _said(words: str, placed):

@@ -218,10 +218,6 @@ def _figures(clip: "Listed") -> str:
     return text
 
 
-def _fast(clip: "Listed") -> float:
-    return -1.0 if math.isnan(clip.speed) else clip.speed
-
-
 def _is_words(name: str) -> bool:
     return name.lower().endswith((".txt", ".csv"))
 
@@ -304,6 +300,6 @@ _kept = _Kept()
 _KEYS = {"NAME": lambda clip: clip.path.lower(),
          "WORDS": lambda clip: (not clip.words, clip.words, clip.path),
          "SECONDS": lambda clip: (-clip.seconds, clip.path),
-         "SPEED": lambda clip: (-_fast(clip), clip.path),
+         "SPEED": lambda clip: (1.0 if math.isnan(clip.speed) else -clip.speed, clip.path),
          "QUALITY": lambda clip: (clip.mark, clip.path)}
 WATCHER = Watcher(name="Watching the library", loaded=_after_load, look=_look_again, ends=_end)
