@@ -11,16 +11,14 @@ from bpy_extras.io_utils import ImportHelper
 from ..beyond_mocap.annotation import annotating
 from ..beyond_mocap.annotation.annotating import Leave
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import areas, popup, window
+from ..scene.core import popup, window
 from ..scene.timeline import video
 from ..scene.timeline.annotating import do, held, name_of, now, type_keys
 from ..scene.timeline.video import drive
 from .verb import Verb
 
-SPACES = {
-    "VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
-    "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor,
-}
+SPACES = {"VIEW_3D": bpy.types.SpaceView3D, "NLA_EDITOR": bpy.types.SpaceNLA, "CLIP_EDITOR": bpy.types.SpaceClipEditor,
+          "DOPESHEET_EDITOR": bpy.types.SpaceDopeSheetEditor, "SEQUENCE_EDITOR": bpy.types.SpaceSequenceEditor}
 DIGITS = ("ZERO", "ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE")
 KEYS = {
     **{name: str(digit) for digit, name in enumerate(DIGITS)},
@@ -33,10 +31,8 @@ KEYS = {
 }
 LOWEST = 10.0  # letters; a lower editor has no room for the menu, and it is drawn in the largest one
 REPEATING = {"EARLIER", "LATER", "PREVIOUS", "NEXT"}
-STATUS = (
-    "1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
-    "X: remove   H: hide the list   Space: play   Esc: leave"
-)
+STATUS = ("1-9: words   I, O: in, out   M: mirror   Left, Right: key moments   Up, Down: players   , . : a frame   "
+          "X: remove   H: hide the list   Space: play   Esc: leave")
 
 _menu: dict = {}  # what is drawn: the box, in which region and for which (by pointer), the word under the mouse
 _running: list[bool] = []  # not empty while the user annotates
@@ -48,16 +44,10 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
 
     bl_idname = "beyond_mocap.annotate"
     bl_label = "Annotate by Keys"
-    keys: StringProperty(
-        name="Keys", options={"SKIP_SAVE"},
-        description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """There is somebody to say it of."""
-        cls.poll_message_set("Import tracking in step 2 first, and choose a player of the list; or open a clip's words")
-        return bool(name_of(context))
+    keys: StringProperty(name="Keys", options={"SKIP_SAVE"},
+                         description="Keys to press at the playhead, with blanks between: '2 2 3 5 ENTER'; for scripts")
+    needs = ("Import tracking in step 2 first, and choose a player of the list; or open a clip's words",
+             lambda context: bool(name_of(context)))
 
     def do(self, context):
         """Press the keys that a script gives."""
@@ -162,7 +152,7 @@ pointer, greyed where the library has no such clip. The same key or Esc leaves""
             area, region = _largest(context)
         at = (self.pointer[0] - region.x, self.pointer[1] - region.y) if self.state.trail and self.pointer else None
         content = popup.content(self.state, self.who, self.told, self.folded)
-        box = popup.laid_out(content, at, areas.free_part(area, region), popup.letters(), popup.width_of)
+        box = popup.laid_out(content, at, window.free_region(area, region), popup.letters(), popup.width_of)
         _menu.update(box=box, region=region.as_pointer(), under=under.as_pointer(), hovered=None)
         window.redraw(*SPACES)
 
@@ -237,11 +227,7 @@ def _holds(place, event) -> bool:
 class VideoVerb(Verb):
     """A verb about the reference video."""
 
-    @classmethod
-    def poll(cls, context):
-        """The reference video."""
-        cls.poll_message_set("Load a reference video first")
-        return context.scene.beyond_mocap.video.clip is not None
+    needs = "Load a reference video first", lambda context: context.scene.beyond_mocap.video.clip is not None
 
 
 class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
@@ -258,7 +244,7 @@ class BEYOND_MOCAP_OT_show_video(VideoVerb, bpy.types.Operator):
 
 def beside(context: bpy.types.Context, clip: bpy.types.MovieClip) -> None:
     """Show the clip in a clip editor: one that is open, else the left half of the largest 3D view, else nowhere."""
-    area = areas.editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
+    area = window.open_editor(context, "CLIP_EDITOR", "VERTICAL", 0.45)
     if area is None:
         return
     space = area.spaces.active
@@ -280,7 +266,6 @@ its own speed whatever the scene's frame rate"""
 
     bl_idname = "beyond_mocap.load_video"
     bl_label = "Load Reference Video"
-
     filter_glob: StringProperty(default=FILES, options={"HIDDEN"})
     rate: FloatProperty(
         name="Frames per Second", default=0.0, min=0.0, max=1000.0, precision=3,
@@ -289,7 +274,6 @@ its own speed whatever the scene's frame rate"""
     show: BoolProperty(name="Show", default=True, description="Open an editor beside the 3D view for it")
 
     def invoke(self, context, event):
-        """The file browser."""
         return ImportHelper.invoke(self, context, event)
 
     def do(self, context):
@@ -309,11 +293,9 @@ class BEYOND_MOCAP_OT_move_video(VideoVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.move_video"
     bl_label = "Move Reference Video"
-
     frames: IntProperty(name="Frames", default=1, description="Frames of the video by which it begins later")
 
     def do(self, context):
-        """Add to its begin."""
         video = context.scene.beyond_mocap.video
         video.begins += self.frames / video.rate
 
@@ -323,13 +305,7 @@ class BEYOND_MOCAP_OT_remove_video(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.remove_video"
     bl_label = "Remove Reference Video"
-
-    @classmethod
-    def poll(cls, context):
-        """There is one."""
-        cls.poll_message_set("There is no reference video")
-        return context.scene.beyond_mocap.video.clip is not None
+    needs = "There is no reference video", lambda context: context.scene.beyond_mocap.video.clip is not None
 
     def do(self, context):
-        """Release it."""
         video.release(context.scene)

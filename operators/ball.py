@@ -13,7 +13,7 @@ from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
 from ..scene.ball.settings import aimed, aimed_ball
 from ..scene.ball.subject import ball_meant, body_meant, stretch_of, target_meant
-from ..scene.core import channels, linked
+from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player
 from ..scene.passes import hits_shown, possession, tracked
@@ -32,7 +32,6 @@ from where it lies"""
 
     bl_idname = "beyond_mocap.aim_ball"
     bl_label = "Aim Ball"
-
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="What the ball is struck with")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     found: BoolProperty(
@@ -42,28 +41,22 @@ from where it lies"""
     first: IntProperty(name="From", default=1, description="First frame on which the ball may be struck")
     last: IntProperty(name="To", default=1, description="Last frame on which the ball may be struck")
     way: EnumProperty(name="Way", items=WAYS, default="AIR", description="How the ball gets there")
-    bounces: IntProperty(
-        name="Bounces", default=0, min=0, max=5, description="How often it touches the ground before it arrives"
-    )
+    bounces: IntProperty(name="Bounces", default=0, min=0, max=5,
+                         description="How often it touches the ground before it arrives")
     timing: EnumProperty(name="Arrives", items=TIMES, default="FREE", description="When it arrives")
-    seconds: FloatProperty(
-        name="Flight", default=1.0, min=0.05, max=20.0, description="Seconds from the strike to the target"
-    )
+    seconds: FloatProperty(name="Flight", default=1.0, min=0.05, max=20.0,
+                           description="Seconds from the strike to the target")
     arrival: IntProperty(name="Frame", default=50, description="Scene frame on which the ball arrives")
     ball: EnumProperty(name="Ball", items=BALLS, default="football", description="What kind of ball it is")
-
-    @classmethod
-    def poll(cls, context):
-        """An armature or a ball."""
-        cls.poll_message_set("Select an armature that strikes, or a ball")
-        return body_meant(context) is not None or ball_meant(context) is not None
+    needs = ("Select an armature that strikes, or a ball",
+             lambda context: body_meant(context) is not None or ball_meant(context) is not None)
 
     def do(self, context):
         """Solve first, then make what is lacking and write."""
         shots.unsure()
         ball, scene = ball_meant(context), context.scene
         if ball is not None and ball.beyond_mocap_aim.on:
-            linked.refuse(ball)
+            channels.check_local(ball)
             solved = shots.solve(scene, shots.wish_of(scene, ball), ball.name)
             shots.write(scene, ball, solved)
         else:
@@ -73,7 +66,7 @@ from where it lies"""
     def new(self, context, ball):
         """A ball that is not aimed yet."""
         body, scene, target = body_meant(context), context.scene, target_meant(context)
-        linked.refuse(ball, body)
+        channels.check_local(ball, body)
         shots.check_ball(ball)
         first, last = self.first, self.last
         if body is None:
@@ -110,7 +103,6 @@ class BEYOND_MOCAP_OT_leave_aim(Verb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """An aimed ball."""
         cls.poll_message_set("No ball is aimed" if not aimed(context.scene) else "Select an aimed ball or its target")
         ball = aimed_ball(context)
         if ball is not None and ball.beyond_mocap_aim.handed:
@@ -130,25 +122,15 @@ from the start to see it"""
 
     bl_idname = "beyond_mocap.ball_to_physics"
     bl_label = "Ball to Physics"
-
     frame: IntProperty(name="Frame", default=0, min=0, description="Frame of the handover; 0: the current one")
-    ball: EnumProperty(
-        name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
-        description="What kind of ball it is",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """A ball that is animated."""
-        cls.poll_message_set("Select a ball that moves")
-        ball = ball_meant(context)
-        if ball is None or ball.animation_data is None or ball.animation_data.action is None:
-            return False
-        cls.poll_message_set("Blender's physics has this ball already")
-        return ball.rigid_body is None
+    ball: EnumProperty(name="Ball", items=(("OWN", "Own", "The kind that it is aimed as"), *BALLS), default="OWN",
+                       description="What kind of ball it is")
+    needs = ("Select a ball that moves",
+             lambda context: (ball := ball_meant(context)) is not None and ball.animation_data is not None
+             and ball.animation_data.action is not None,
+             "Blender's physics has this ball already", lambda context: ball_meant(context).rigid_body is None)
 
     def do(self, context):
-        """Hand it over."""
         ball = ball_meant(context)
         frame = self.frame or context.scene.frame_current
         kind = ball.beyond_mocap_aim.ball if self.ball == "OWN" else self.ball
@@ -163,27 +145,17 @@ class BEYOND_MOCAP_OT_ball_from_physics(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.ball_from_physics"
     bl_label = "Take Ball Back"
-
-    @classmethod
-    def poll(cls, context):
-        """A ball that has been handed over."""
-        cls.poll_message_set("Blender's physics has no ball that is selected")
-        ball = ball_meant(context)
-        return ball is not None and ball.beyond_mocap_aim.handed
+    needs = ("Blender's physics has no ball that is selected",
+             lambda context: (ball := ball_meant(context)) is not None and ball.beyond_mocap_aim.handed)
 
     def do(self, context):
-        """Take it back."""
         handover.take_back(context.scene, ball_meant(context))
 
 
 class HitVerb(Verb):
     """A verb about an armature's strikes."""
 
-    @classmethod
-    def poll(cls, context):
-        """An armature."""
-        cls.poll_message_set("Select an armature with a motion")
-        return subject(context) is not None
+    needs = "Select an armature with a motion", lambda context: subject(context) is not None
 
 
 class BEYOND_MOCAP_OT_hit_analysis(HitVerb, bpy.types.Operator):
@@ -192,13 +164,10 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
 
     bl_idname = "beyond_mocap.hit_analysis"
     bl_label = "Hit Analysis"
-
     part: EnumProperty(name="Part", items=PARTS, default="foot", description="The part whose strikes are looked for")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
-    threshold: FloatProperty(
-        name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
-        description="Metres above which a strike may be; 0: automatic",
-    )
+    threshold: FloatProperty(name="Threshold", default=0.0, min=0.0, max=5.0, precision=2,
+                             description="Metres above which a strike may be; 0: automatic")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     markers: BoolProperty(name="Markers", default=True, description="Set markers on the action")
 
@@ -209,7 +178,6 @@ the panel, and markers on its action. A ball was never seen: the marked frame is
         return self.execute(context)
 
     def do(self, context):
-        """Analyse, note, mark."""
         body = subject(context)
         found = hits_shown.analyse(context.scene, body, self.part, side=self.side, threshold=self.threshold,
                                    bone=self.bone, markers=self.markers)
@@ -227,11 +195,9 @@ class BEYOND_MOCAP_OT_go_to_strike(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.go_to_strike"
     bl_label = "Go to Strike"
-
     frame: IntProperty(name="Frame", options={"SKIP_SAVE"}, description="Scene frame to go to")
 
     def do(self, context):
-        """Set the frame."""
         context.scene.frame_set(self.frame)
 
 
@@ -242,9 +208,8 @@ class BEYOND_MOCAP_OT_clear_hits(HitVerb, bpy.types.Operator):
     bl_label = "Clear Hit Analysis"
 
     def do(self, context):
-        """Markers and figures."""
         body = subject(context)
-        linked.refuse(body)
+        channels.check_local(body)
         if not found_of(body.beyond_mocap_hits):
             raise InputError(f"armature {body.name}", "no hit analysis", "one", "press Hit Analysis")
         played = channels.playing(body)[0]
@@ -260,29 +225,18 @@ Child Of constraint with a keyed influence. The ball's own action is put aside; 
 
     bl_idname = "beyond_mocap.take_ball"
     bl_label = "Take Ball"
-
     part: EnumProperty(name="Part", items=PARTS, default="hand", description="What carries the ball")
     side: EnumProperty(name="Side", items=SIDES, default="right", description="Left or right, of what there are two")
     bone: StringProperty(name="Bone", description="A bone by name, in place of the part")
     first: IntProperty(name="From", default=1, description="Frame from which on it is carried")
     last: IntProperty(name="To", default=30, description="Frame on which it is let go")
     how: EnumProperty(name="Hold", items=HOLDS, default="KEEP", description="Where the ball is while it is carried")
-    settle: IntProperty(
-        name="Settle", default=4, min=1, max=1000,
-        description="Frames within which the ball comes to where it is carried",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """An armature and a ball."""
-        cls.poll_message_set("Select an armature")
-        if subject(context) is None:
-            return False
-        cls.poll_message_set("Select the ball beside the armature")
-        return ball_of(context) is not None
+    settle: IntProperty(name="Settle", default=4, min=1, max=1000,
+                        description="Frames within which the ball comes to where it is carried")
+    needs = ("Select an armature", lambda context: subject(context) is not None,
+             "Select the ball beside the armature", lambda context: ball_of(context) is not None)
 
     def do(self, context):
-        """Find the bone, carry."""
         body, ball, scene = subject(context), ball_of(context), context.scene
         bone = self.bone or possession.bone_of(scene, body, self.part, self.side)
         skin = 0.03 if self.bone else possession.SURFACE.get(self.part, 0.03)
@@ -297,18 +251,11 @@ After the last one the ball plays its own action again"""
 
     bl_idname = "beyond_mocap.free_ball"
     bl_label = "Free Ball"
-
     number: IntProperty(name="Stretch", default=-1, min=-1, options={"SKIP_SAVE"}, description="Which one; -1: all")
-
-    @classmethod
-    def poll(cls, context):
-        """A ball that is carried."""
-        cls.poll_message_set("Nobody carries the ball")
-        ball = ball_of(context)
-        return ball is not None and len(ball.beyond_mocap_ball.holds) > 0
+    needs = ("Nobody carries the ball",
+             lambda context: (ball := ball_of(context)) is not None and len(ball.beyond_mocap_ball.holds) > 0)
 
     def do(self, context):
-        """One or all."""
         ball = ball_of(context)
         if self.number >= len(ball.beyond_mocap_ball.holds):
             raise InputError("stretch", f"number {self.number}", f"below {len(ball.beyond_mocap_ball.holds)}")
@@ -322,29 +269,21 @@ its touches proposals for key moments"""
     bl_idname = "beyond_mocap.solve_ball"
     bl_label = "Solve Ball"
     kind = "ball"
-
-    @classmethod
-    def poll(cls, context):
-        """Somebody with a file."""
-        cls.poll_message_set("Import tracking in step 2 first")
-        player = active_player(context.scene.beyond_mocap)
-        return player is not None and bool(player.tracking_file)
+    needs = ("Import tracking in step 2 first",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
+             and bool(player.tracking_file))
 
     def order(self, context):
         """What is to be solved."""
         return tracked.order_of(context.scene)
 
-    @staticmethod
-    def work(order, progress, cancelled, hurry):
-        """Read and solve."""
-        return tracked.work(order, progress, cancelled, hurry)
+    work = staticmethod(tracked.work)
 
     def apply(self, scene, solved):
         """The ball, and the list of touches."""
         tracked.write(scene, solved)
-        self.report(
-            {"INFO"}, f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean"
-        )
+        self.report({"INFO"},
+                    f"{len(solved.touches)} touches solved, with {solved.confidence:.0%} confidence in the mean")
 
 
 class BEYOND_MOCAP_OT_accept_touches(Verb, bpy.types.Operator):
@@ -353,27 +292,18 @@ none is added"""
 
     bl_idname = "beyond_mocap.accept_touches"
     bl_label = "Accept Touches"
-
-    active: BoolProperty(
-        name="Active Player", default=False, options={"SKIP_SAVE"}, description="Only those of the active player"
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """There are touches."""
-        cls.poll_message_set("Press Solve Ball first")
-        return len(context.scene.beyond_mocap_passes.touches) > 0
+    active: BoolProperty(name="Active Player", default=False, options={"SKIP_SAVE"},
+                         description="Only those of the active player")
+    needs = "Press Solve Ball first", lambda context: len(context.scene.beyond_mocap_passes.touches) > 0
 
     def do(self, context):
-        """Lay the moments."""
         player = active_player(context.scene.beyond_mocap)
         if self.active and player is None:
             raise InputError("player", "none in the list", "one", "import tracking in step 2")
         count, told = tracked.accept(context, player.name if self.active else "")
         if not count and not told:
-            raise InputError(
-                "touches", "none is ticked that has words and a player of the list", "one", "tick some in the list"
-            )
+            raise InputError("touches", "none is ticked that has words and a player of the list", "one",
+                             "tick some in the list")
         for line in told[:5]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{count} key moments added")

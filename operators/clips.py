@@ -17,10 +17,9 @@ from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place
 from ..beyond_mocap.motion.quaternion import about_up, rotate
-from ..scene.core import action, channels
+from ..scene.core import action, channels, window
 from ..scene.library import assets, clips, foreign, recordings
 from ..scene.rigs import armature, export
-from ..scene.timeline import clip_annotation
 from .verb import BackgroundVerb, ImportVerb, Verb
 
 
@@ -31,12 +30,9 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
     bl_idname = "beyond_mocap.import_clips"
     bl_label = "Import Motion Clips"
     filename_ext = ".bvh"
-
     filter_glob: StringProperty(default=";".join(f"*{ending}" for ending in (".bvh", *FOREIGN)), options={"HIDDEN"})
-    unit: FloatProperty(
-        name="Metres per unit", default=0.0, min=0.0, precision=5,
-        description="Size of one unit of the file in metres; 0 guesses it from the height of the hips",
-    )
+    unit: FloatProperty(name="Metres per unit", default=0.0, min=0.0, precision=5,
+                        description="Size of one unit of the file in metres; 0 guesses it from the height of the hips")
     reuse: BoolProperty(
         name="Onto Selected Armature", default=False,
         description="Add the clips' actions to the active armature, if its bones are the same, and make no new one",
@@ -62,11 +58,7 @@ it. Of a file with a body only the motion is taken, hips up and in metres"""
             made.append(body)
             for note in clip.notes:
                 self.report({"INFO"}, f"{name}: {note}")
-        for other in context.selected_objects:
-            other.select_set(False)
-        for body in made:
-            body.select_set(True)
-        context.view_layer.objects.active = made[-1]
+        window.select_only(context, made[-1], *made)
         self.report({"INFO"}, f"clips imported at the scene's frame rate: {len(made)}")
 
     def read(self, path: Path) -> list[tuple[str, bvh.BvhClip]]:
@@ -104,7 +96,6 @@ class BEYOND_MOCAP_FH_clips(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context):
-        """Where animators keep motions."""
         return context.area is not None and context.area.type in {"VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR"}
 
 
@@ -118,7 +109,6 @@ class BEYOND_MOCAP_FH_foreign_clips(bpy.types.FileHandler):
 
     @classmethod
     def poll_drop(cls, context):
-        """Where animators keep motions."""
         return BEYOND_MOCAP_FH_clips.poll_drop(context)
 
 
@@ -128,19 +118,11 @@ turns and kicks to the other side. The motion before is kept as an action"""
 
     bl_idname = "beyond_mocap.mirror"
     bl_label = "Mirror Motion"
-
-    @classmethod
-    def poll(cls, context):
-        """An armature that moves."""
-        body = context.object
-        if body is None or body.type != "ARMATURE":
-            cls.poll_message_set("Select an armature first")
-            return False
-        cls.poll_message_set("The active armature plays no action")
-        return channels.playing(body)[0] is not None
+    needs = ("Select an armature first",
+             lambda context: context.object is not None and context.object.type == "ARMATURE",
+             "The active armature plays no action", lambda context: channels.playing(context.object)[0] is not None)
 
     def do(self, context):
-        """Read, mirror, write."""
         body = context.object
         motion = action.read(body, context.scene)
         start, name = action.first_frame(body), channels.playing(body)[0].name
@@ -156,11 +138,9 @@ def mirrored_in_place(motion: Motion) -> Motion:
     return place(twin, turn, offset)
 
 
-WHICH = (
-    ("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
-    ("SHOWN", "Clips Shown", "All clips that the library's list shows now"),
-    ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"),
-)
+WHICH = (("CHOSEN", "Chosen Clip", "The clip chosen in the library's list"),
+         ("SHOWN", "Clips Shown", "All clips that the library's list shows now"),
+         ("SELECTED", "Selected Armatures", "The actions that the selected armatures play"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,11 +159,9 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
     bl_idname = "beyond_mocap.make_assets"
     bl_label = "Clips as Assets"
     kind = "assets"
-
     which: EnumProperty(name="Clips", items=WHICH, default="CHOSEN", description="Which clips become assets")
-    apart: BoolProperty(
-        name="As a File", description="Write a .blend of their own and leave this file as it is", options={"SKIP_SAVE"}
-    )
+    apart: BoolProperty(name="As a File", description="Write a .blend of their own and leave this file as it is",
+                        options={"SKIP_SAVE"})
     overwrite: BoolProperty(name="Overwrite", description="Replace a file that is there", options={"SKIP_SAVE"})
     filepath: StringProperty(subtype="FILE_PATH", options={"SKIP_SAVE"}, description="The .blend to write")
     filter_glob: StringProperty(default="*.blend", options={"HIDDEN"})
@@ -209,9 +187,8 @@ In this file, or as a .blend that you keep in a folder of asset libraries"""
         chosen = clips.active(context.window_manager)
         wanted = list(rows) if self.which == "SHOWN" else [chosen] if chosen else []
         if not wanted:
-            raise InputError(
-                "assets", "no clip in the list", "clips of the library", "press Build Library or List Clips"
-            )
+            raise InputError("assets", "no clip in the list", "clips of the library",
+                             "press Build Library or List Clips")
         folder = recordings.folder_of(settings)
         files = tuple((row.path, *recordings.file_of(settings, row.path), row.figures) for row in wanted)
         return Order(folder, files, ())
@@ -294,9 +271,8 @@ def _playing(context) -> list[bpy.types.Object]:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")
         if rig.beyond_mocap_ride.on:
-            raise InputError(
-                rig.name, "its motion still rides a path", "a motion of its own", "press Keep in Path Editing first"
-            )
+            raise InputError(rig.name, "its motion still rides a path", "a motion of its own",
+                             "press Keep in Path Editing first")
     return rigs
 
 
@@ -304,7 +280,7 @@ def _draft_of(rig, context) -> assets.Draft:
     """What an armature plays, with the words of its strips where it has any."""
     motion, item = action.read(rig, context.scene), channels.playing(rig)[0]
     try:
-        rows = clip_annotation.said_at(rig, motion.fps, len(motion))
+        rows = recordings.read_words_at(rig, motion.fps, len(motion))
     except InputError:
         rows = ()
     return assets.draft(item.name, motion, rows, f"{motion.duration:.1f} s", item.name)

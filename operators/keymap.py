@@ -12,10 +12,8 @@ from typing import NamedTuple
 import bpy
 
 OURS = "beyond_mocap."
-NUDGES = {
-    "LEFT_ARROW": "LEFT", "RIGHT_ARROW": "RIGHT", "UP_ARROW": "FORTH", "DOWN_ARROW": "BACK", "PAGE_UP": "UP",
-    "PAGE_DOWN": "DOWN",
-}
+NUDGES = {"LEFT_ARROW": "LEFT", "RIGHT_ARROW": "RIGHT", "UP_ARROW": "FORTH", "DOWN_ARROW": "BACK", "PAGE_UP": "UP",
+          "PAGE_DOWN": "DOWN"}
 
 
 class Entry(NamedTuple):
@@ -42,15 +40,11 @@ ENTRIES: tuple[Entry, ...] = (
     Entry("Dopesheet", "DOPESHEET_EDITOR", "beyond_mocap.pick_moment", "LEFTMOUSE"),
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "NUMPAD_0", ("shift",)),
     Entry("3D View", "VIEW_3D", "beyond_mocap.path_camera", "J", ("shift",)),
-    *(
-        Entry("Object Mode", "EMPTY", "beyond_mocap.stream_target", key, properties={"number": number})
-        for number, key in enumerate(("ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"), 1)
-    ),
-    *(
-        Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key=key, modifiers=("alt",),
-              properties={"direction": direction}, repeat=True)
-        for key, direction in NUDGES.items()
-    ),
+    *(Entry("Object Mode", "EMPTY", "beyond_mocap.stream_target", key, properties={"number": number})
+      for number, key in enumerate(("ONE", "TWO", "THREE", "FOUR", "FIVE", "SIX", "SEVEN", "EIGHT", "NINE"), 1)),
+    *(Entry("Curve", "EMPTY", "beyond_mocap.nudge_points", key=key, modifiers=("alt",),
+            properties={"direction": direction}, repeat=True)
+      for key, direction in NUDGES.items()),
 )
 
 

@@ -14,8 +14,7 @@ from ..beyond_mocap.annotation.labels import find_label
 from ..beyond_mocap.base.errors import InputError
 from ..scene.core import preferences, session, window
 from ..scene.core.settings import absolute, as_setting
-from ..scene.library import clips, foreign, recordings, watch
-from ..scene.timeline import clip_annotation
+from ..scene.library import clips, foreign, recordings
 from .verb import BackgroundVerb, Verb
 
 if TYPE_CHECKING:
@@ -25,26 +24,17 @@ if TYPE_CHECKING:
 class FolderVerb(BackgroundVerb):
     """A verb about the library's folder."""
 
-    @classmethod
-    def poll(cls, context):
-        """A folder has to be chosen."""
-        cls.poll_message_set("Choose the library's folder first")
-        return bool(context.scene.beyond_mocap.library_folder)
+    needs = "Choose the library's folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
 
 
 class ClipVerb(Verb):
     """A verb about one clip of the list: the one that it is told, else the one chosen there."""
 
-    path: StringProperty(
-        name="Clip", options={"SKIP_SAVE"}, description="Below the library's folder; empty: the one chosen in the list"
-    )
+    path: StringProperty(name="Clip", options={"SKIP_SAVE"},
+                         description="Below the library's folder; empty: the one chosen in the list")
     dressed: BoolProperty(name="Body", default=True, description="With a low-poly body, not only bones")
-
-    @classmethod
-    def poll(cls, context):
-        """A clip in the list."""
-        cls.poll_message_set("No clip is listed; press Build Library or List Clips first")
-        return clips.active(context.window_manager) is not None
+    needs = ("No clip is listed; press Build Library or List Clips first",
+             lambda context: clips.active(context.window_manager) is not None)
 
     def clip(self, context) -> str:
         """The clip, below the library's folder."""
@@ -88,13 +78,10 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
     queue = None  # foreign.Queue while a window waits for conversions
     job = None
     notes = ()
-
-    rebuild: BoolProperty(
-        name="From Scratch", description="Ignore what an earlier build has kept", options={"SKIP_SAVE"}
-    )
+    rebuild: BoolProperty(name="From Scratch", description="Ignore what an earlier build has kept",
+                          options={"SKIP_SAVE"})
 
     def order(self, context):
-        """Folder and unit."""
         settings = context.scene.beyond_mocap
         if not settings.library_folder:
             raise InputError("library", "no folder chosen", "a folder of BVH clips", "choose one in step 1")
@@ -165,7 +152,7 @@ is read again. FBX, glTF and USD clips are converted first, each once"""
         from ..beyond_mocap.library.build import build
         from ..beyond_mocap.library.listing import listed, scanned
 
-        files = watch.look(order.folder) or {}
+        files = clips.list_files(order.folder) or {}
         asked = {"rebuild": order.rebuild, "unit": order.unit, **order.preferences}
         try:
             built = build(order.folder, **asked, progress=progress, cancelled=cancelled)
@@ -218,10 +205,9 @@ Library"""
     kind = "list"
 
     def order(self, context):
-        """The folder."""
         settings = context.scene.beyond_mocap
         folder = absolute(settings.library_folder)
-        watch.check(context.scene)
+        clips.check_folder(context.scene)
         built = session.library(folder, settings.library_unit or None)
         return ListOrder(settings.library_folder, folder, preferences.cache_folder(folder), built)
 
@@ -231,14 +217,13 @@ Library"""
         from ..beyond_mocap.library.listing import listed, scanned
 
         progress(0.0, "Listing clips")
-        files = watch.look(order.folder)
+        files = clips.list_files(order.folder)
         if files is None:
             raise InputError(order.folder, "no such folder", "the library's folder", "press Relink Library")
         found = listed(order.built) if order.built is not None else scanned(order.folder, order.cache_dir)
         return order.setting, found, files
 
     def apply(self, _scene, result):
-        """Show them."""
         setting, found, files = result
         clips.keep(bpy.context.window_manager, setting, found, files)
         self.report({"INFO"}, f"clips listed: {len(found)}")
@@ -249,37 +234,29 @@ class BEYOND_MOCAP_OT_relink_library(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.relink_library"
     bl_label = "Relink Library"
-
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        """A folder that was set once."""
-        cls.poll_message_set("Choose the library's folder in the field above")
-        return bool(context.scene.beyond_mocap.library_folder)
+    needs = ("Choose the library's folder in the field above",
+             lambda context: bool(context.scene.beyond_mocap.library_folder))
 
     def invoke(self, context, _event):
         """Look beside the file first; ask where nothing is found."""
-        if watch.relink(context.scene):
+        if clips.relink_library(context.scene):
             return self.execute(context)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def do(self, context):
-        """Set the folder."""
         settings = context.scene.beyond_mocap
         chosen = bpy.path.abspath(self.directory) if self.directory else ""
-        if chosen and not watch.holds_recordings(chosen):
+        if chosen and not clips.holds_recordings(chosen):
             raise InputError(chosen, "no recordings below it", "the library's folder", "choose another")
         if chosen:
             settings.library_folder = as_setting(chosen)
-        elif not os.path.isdir(absolute(settings.library_folder)) and not watch.relink(context.scene):
-            raise InputError(
-                absolute(settings.library_folder), "no such folder, nor one like it beside this file",
-                "the library's folder", "choose it in Relink Library",
-            )
-        watch.check(context.scene)
+        elif not os.path.isdir(absolute(settings.library_folder)) and not clips.relink_library(context.scene):
+            raise InputError(absolute(settings.library_folder), "no such folder, nor one like it beside this file",
+                             "the library's folder", "choose it in Relink Library")
+        clips.check_folder(context.scene)
         self.report({"INFO"}, f"library: {absolute(settings.library_folder)}")
 
 
@@ -293,8 +270,8 @@ action"""
     def do(self, context):
         """Read the file, then make the armature."""
         path = self.clip(context)
-        clip, notes = recordings.read(context.scene.beyond_mocap, path)
-        body = recordings.show(context, clip, path, self.dressed)
+        clip, notes = recordings.read_recording(context.scene.beyond_mocap, path)
+        body = recordings.show_recording(context, clip, path, self.dressed)
         for note in notes:
             self.report({"INFO"}, f"{body.name}: {note}")
         self.report({"INFO"}, f"{body.name}: {clip.duration:.1f} s, {len(clip)} frames at {clip.fps:g} per second")
@@ -306,18 +283,13 @@ were not saved are lost"""
 
     bl_idname = "beyond_mocap.remove_clip"
     bl_label = "Remove Clip"
-
-    @classmethod
-    def poll(cls, context):
-        """An armature that shows a clip."""
-        cls.poll_message_set("Select the armature of a clip that came from the library's list")
-        return bool(clip_annotation.shown(context.object))
+    needs = ("Select the armature of a clip that came from the library's list",
+             lambda context: bool(recordings.shown_clip(context.object)))
 
     def do(self, context):
-        """Remove it."""
         rig = context.object
         if rig.library is not None or rig.override_library is not None:
             raise InputError(rig.name, "it belongs to another file", "an object of this file")
         if rig.mode != "OBJECT":
             bpy.ops.object.mode_set(mode="OBJECT")
-        clip_annotation.remove(rig)
+        recordings.remove_clip(rig)

@@ -13,7 +13,7 @@ from ..scene.core import preferences, session
 from ..scene.core.settings import absolute
 from ..scene.core.window import clear_status
 from ..scene.library import clips, recordings
-from ..scene.timeline import clip_annotation, lanes, proposals
+from ..scene.timeline import lanes, proposals
 from .annotate import SPACES
 from .library import ClipVerb, FolderVerb
 from .verb import Verb
@@ -22,11 +22,8 @@ from .verb import Verb
 class OpenClipVerb(Verb):
     """A verb about the library clip that the active armature shows."""
 
-    @classmethod
-    def poll(cls, context):
-        """An armature that shows a clip."""
-        cls.poll_message_set("Open a clip with Annotate Clip first, and keep its armature active")
-        return bool(clip_annotation.shown(context.object))
+    needs = ("Open a clip with Annotate Clip first, and keep its armature active",
+             lambda context: bool(recordings.shown_clip(context.object)))
 
 
 class BEYOND_MOCAP_OT_annotate_clip(ClipVerb, bpy.types.Operator):
@@ -41,13 +38,13 @@ the NLA editor. Change them there, or have words proposed, then press Save Words
         from ..beyond_mocap.library.keep_words import as_timeline, read_sources, read_words
 
         settings, path = context.scene.beyond_mocap, self.clip(context)
-        motion, _ = recordings.read(settings, path)
+        motion, _ = recordings.read_recording(settings, path)
         folder = recordings.folder_of(settings)
         rows = read_words(folder / path, folder, motion.fps)
         timeline = as_timeline(rows, motion.fps)
         said = read_sources(folder / path, folder, rows, motion.fps)
-        rig = recordings.show(context, motion, path, self.dressed)
-        clip_annotation.lay(rig, context.scene, motion, timeline)
+        rig = recordings.show_recording(context, motion, path, self.dressed)
+        recordings.lay_words(rig, context.scene, motion, timeline)
         for row, (source, confidence) in said.items():
             proposals.add(rig, row, source, confidence, "ACCEPTED")
         self.report({"INFO"}, f"{rig.name}: {len(rows)} {'row' if len(rows) == 1 else 'rows'} of words")
@@ -60,20 +57,15 @@ yours to add"""
 
     bl_idname = "beyond_mocap.propose_words"
     bl_label = "Propose Words"
-
-    least: FloatProperty(
-        name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
-        description="Proposals that are less sure than this are left out",
-    )
+    least: FloatProperty(name="At Least", default=0.5, min=0.0, max=1.0, subtype="FACTOR",
+                         description="Proposals that are less sure than this are left out")
     replace: BoolProperty(
         name="Replace", default=True,
         description="In place of the strips that are there; else they stay, and proposals are put beside them",
     )
 
-    review: BoolProperty(
-        name="One by One", default=False, options={"SKIP_SAVE"},
-        description="Only list them: each becomes a strip or key moment when it is accepted",
-    )
+    review: BoolProperty(name="One by One", default=False, options={"SKIP_SAVE"},
+                         description="Only list them: each becomes a strip or key moment when it is accepted")
 
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
@@ -83,7 +75,7 @@ yours to add"""
         from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
 
         settings, rig = context.scene.beyond_mocap, context.object
-        motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
+        motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
         built = session.library(absolute(settings.library_folder), settings.library_unit or None)
         try:
             gaits = gaits_of(built) if built is not None else GAITS
@@ -98,7 +90,7 @@ yours to add"""
         told = as_timeline([one.annotation for one in found], motion.fps)
         if before is not None:
             told = Timeline((*before.spans, *told.spans), (*before.keys, *told.keys))
-        clip_annotation.lay(rig, context.scene, motion, told)
+        recordings.lay_words(rig, context.scene, motion, told)
         proposals.keep(rig, found, "ACCEPTED", beside=not self.replace)
         for one in found:
             row = one.annotation
@@ -115,36 +107,29 @@ yours to add"""
         from ..beyond_mocap.annotation import Timeline
 
         if not lanes.has(rig):
-            clip_annotation.lay(rig, scene, motion, Timeline())
+            recordings.lay_words(rig, scene, motion, Timeline())
         said = lanes.read(rig)
         new = [one for one in found if not proposals.said_already(said, one.annotation, motion.fps)]
         proposals.keep(rig, new)
         self.report({"INFO"}, f"{rig.name}: {len(new)} proposal{'s' * (len(new) != 1)} to look through")
 
 
-WHAT = (
-    ("ACCEPT", "Accept", "Put it among the clip's words, and go to the next one"),
-    ("REFUSE", "Refuse", "Leave it out, and go to the next one"),
-    ("NEXT", "Next", "Look at the next one"),
-    ("PREVIOUS", "Previous", "Look at the one before"),
-    ("ACCEPT_ALL", "Accept All", "Accept all that are still open"),
-    ("REFUSE_ALL", "Refuse All", "Refuse all that are still open"),
-)
-KEYS = {
-    "A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
-    "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS",
-}
+WHAT = (("ACCEPT", "Accept", "Put it among the clip's words, and go to the next one"),
+        ("REFUSE", "Refuse", "Leave it out, and go to the next one"),
+        ("NEXT", "Next", "Look at the next one"),
+        ("PREVIOUS", "Previous", "Look at the one before"),
+        ("ACCEPT_ALL", "Accept All", "Accept all that are still open"),
+        ("REFUSE_ALL", "Refuse All", "Refuse all that are still open"))
+KEYS = {"A": "ACCEPT", "RET": "ACCEPT", "NUMPAD_ENTER": "ACCEPT", "X": "REFUSE", "DEL": "REFUSE", "DOWN_ARROW": "NEXT",
+        "RIGHT_ARROW": "NEXT", "UP_ARROW": "PREVIOUS", "LEFT_ARROW": "PREVIOUS"}
 STATUS = "A, Enter: accept   X: refuse   Up, Down: the one before, the next   Space: play   Esc: leave"
 
 
 class ProposalVerb(Verb):
     """A verb about what was proposed for the active clip."""
 
-    @classmethod
-    def poll(cls, context):
-        """Something is listed."""
-        cls.poll_message_set("Open a clip with Annotate Clip first, and press Look Through")
-        return context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0
+    needs = ("Open a clip with Annotate Clip first, and press Look Through",
+             lambda context: context.object is not None and len(context.object.beyond_mocap_proposals.listed) > 0)
 
 
 class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
@@ -152,16 +137,12 @@ class BEYOND_MOCAP_OT_judge_proposal(ProposalVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.judge_proposal"
     bl_label = "Judge Proposal"
-
     what: EnumProperty(name="What", items=WHAT, default="ACCEPT", description="What becomes of it")
-    index: IntProperty(
-        name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
-        description="Its place in the list; -1: the chosen one",
-    )
+    index: IntProperty(name="Proposal", default=-1, min=-1, options={"SKIP_SAVE"},
+                       description="Its place in the list; -1: the chosen one")
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         return next(text for name, _, text in WHAT if name == properties.what)
 
     def do(self, context):
@@ -177,7 +158,6 @@ the next one; Up and Down step, Esc leaves"""
     bl_label = "Judge by Keys"
 
     def do(self, _context):
-        """Keys need a window."""
         raise InputError("Judge by Keys", "no window", "a 3D view", "in scripts use Judge Proposal")
 
     def invoke(self, context, _event):
@@ -277,10 +257,8 @@ of it. What is written there already is overwritten only when you say so"""
     bl_idname = "beyond_mocap.save_words"
     bl_label = "Save Words"
     bl_options = {"REGISTER"}
-
-    overwrite: BoolProperty(
-        name="Overwrite", description="Replace what is written about this clip", options={"SKIP_SAVE"}
-    )
+    overwrite: BoolProperty(name="Overwrite", description="Replace what is written about this clip",
+                            options={"SKIP_SAVE"})
 
     def invoke(self, context, event):
         """Ask before words are overwritten."""
@@ -288,9 +266,9 @@ of it. What is written there already is overwritten only when you say so"""
         from ..beyond_mocap.library.keep_words import has_words, place
 
         rig = context.object
-        clip, folder = clip_annotation.clip_file(rig)
+        clip, folder = recordings.clip_file(rig)
         try:
-            there = has_words(clip, folder, rig.get(clip_annotation.RATE, 30.0))
+            there = has_words(clip, folder, rig.get(recordings.RATE, 30.0))
             form, target = place(clip, folder)
         except (InputError, OSError):
             return self.execute(context)
@@ -307,11 +285,11 @@ of it. What is written there already is overwritten only when you say so"""
         from ..beyond_mocap.library.keep_words import keep
 
         rig = context.object
-        rows = clip_annotation.said(rig)
-        clip, folder = clip_annotation.clip_file(rig)
-        target = keep(clip, folder, rows, fps=rig[clip_annotation.RATE], overwrite=self.overwrite,
+        rows = recordings.read_words(rig)
+        clip, folder = recordings.clip_file(rig)
+        target = keep(clip, folder, rows, fps=rig[recordings.RATE], overwrite=self.overwrite,
                       sources=proposals.sources(rig))
-        clips.say(context.window_manager, clip_annotation.shown(rig), rows)
+        clips.say(context.window_manager, recordings.shown_clip(rig), rows)
         self.report({"INFO"}, f"{len(rows)} rows of words written to {target}; Build Library takes them in")
 
 
@@ -332,10 +310,8 @@ same acts in others. What is learned is kept in a file, which serves any library
     bl_idname = "beyond_mocap.learn_words"
     bl_label = "Learn from Words"
     kind = "learning"
-
-    out: StringProperty(
-        name="File", subtype="FILE_PATH", options={"SKIP_SAVE"}, description="Where it is kept; empty: in the cache"
-    )
+    out: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
+                        description="Where it is kept; empty: in the cache")
 
     def order(self, context):
         """Folder, unit and where to."""

@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
-from ..scene.core import linked
+from ..scene.core import channels, window
 from ..scene.core.settings import as_setting
 from ..scene.markers import cloud, models, sets, solve, thrown
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
@@ -21,17 +21,13 @@ from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 class OnMarkers:
     """To be mixed into a verb: it is about the cloud of markers that is meant."""
 
-    @classmethod
-    def poll(cls, context):
-        """A cloud."""
-        cls.poll_message_set("Select a cloud of markers (Import Markers makes one)")
-        return cloud_meant(context) is not None
+    needs = "Select a cloud of markers (Import Markers makes one)", lambda context: cloud_meant(context) is not None
 
     @staticmethod
     def cloud(context):
         """The cloud; InputError where it belongs to another file."""
         thing = cloud_meant(context)
-        linked.refuse(thing, thing.data)
+        channels.check_local(thing, thing.data)
         return thing
 
     @staticmethod
@@ -42,10 +38,8 @@ class OnMarkers:
         return bpy.context.temp_override(scene=scene, view_layer=scene.view_layers[0])
 
 
-UP = (
-    ("AUTO", "Found", "As the file says, or heads above feet"),
-    *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")),
-)
+UP = (("AUTO", "Found", "As the file says, or heads above feet"),
+      *((axis, axis, f"{axis} of the file points up") for axis in ("X", "-X", "Y", "-Y", "Z", "-Z")))
 
 
 class BEYOND_MOCAP_OT_import_markers(ImportVerb, bpy.types.Operator):
@@ -55,7 +49,6 @@ set know their segments at once"""
     bl_idname = "beyond_mocap.import_markers"
     bl_label = "Import Markers"
     filename_ext = ".c3d"
-
     filter_glob: StringProperty(default="*.c3d;*.trc", options={"HIDDEN"})
     unit: FloatProperty(
         name="Metres per unit", default=0.0, min=0.0, precision=5,
@@ -79,11 +72,7 @@ set know their segments at once"""
         if context.mode != "OBJECT":  # what is edited would stay so beside what is then active
             bpy.ops.object.mode_set(mode="OBJECT")
         made = [self.add(context, path, trial) for path, trial in trials]
-        for other in context.selected_objects:
-            other.select_set(False)
-        for thing in made:
-            thing.select_set(True)
-        context.view_layer.objects.active = made[0]
+        window.select_only(context, *made)
 
     def add(self, context, path: Path, trial) -> bpy.types.Object:
         """One cloud, and what is to be said of it."""
@@ -130,7 +119,6 @@ class BEYOND_MOCAP_OT_assign_markers(OnMarkers, Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.assign_markers"
     bl_label = "Assign Markers"
-
     segment: EnumProperty(name="Segment", items=segments, description="The segment of the body that carries them")
 
     def do(self, context):
@@ -162,11 +150,9 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.use_marker_set"
     bl_label = "Use Marker Set"
-
     which: EnumProperty(name="Marker Set", items=shipped, description="Which one")
 
     def do(self, context):
-        """Find it, apply it."""
         from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         thing = self.cloud(context)
@@ -184,18 +170,14 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
     bl_idname = "beyond_mocap.load_marker_set"
     bl_label = "Load Marker Set"
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
-        """Read it, apply it."""
         from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one marker set")
+        path = self.chosen_one("one marker set")
         thing = self.cloud(context)
-        for line in sets.apply(thing, read_marker_set(chosen[0])):
+        for line in sets.apply(thing, read_marker_set(path)):
             self.report({"WARNING"}, line)
 
 
@@ -207,7 +189,6 @@ line"""
     bl_label = "Save Marker Set"
     bl_options = {"REGISTER"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
@@ -226,20 +207,14 @@ places of their joints from it"""
 
     bl_idname = "beyond_mocap.set_static"
     bl_label = "Set Static Trial"
-
-    @classmethod
-    def poll(cls, context):
-        """Two clouds at least, one of them active."""
-        active = context.view_layer.objects.active
-        cls.poll_message_set("Make the cloud of the static trial active; there have to be others")
-        return is_cloud(active) and len(clouds(context.scene)) > 1
+    needs = ("Make the cloud of the static trial active; there have to be others",
+             lambda context: is_cloud(context.view_layer.objects.active) and len(clouds(context.scene)) > 1)
 
     def do(self, context):
-        """Point to it."""
         static = context.view_layer.objects.active
         others = [thing for thing in clouds(context.scene) if thing != static]
         chosen = [thing for thing in others if thing.select_get()] or others
-        linked.refuse(*chosen)
+        channels.check_local(*chosen)
         if static.beyond_mocap_cloud.static in chosen:
             raise InputError(static.name, "its own static trial is among them", "a trial without", "clear it first")
         for thing in chosen:
@@ -253,20 +228,17 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
     bl_idname = "beyond_mocap.load_marker_model"
     bl_label = "Load Marker Model"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
         """Read it, keep it with the cloud."""
         from ..beyond_mocap.markers.files.model_json import read_model
 
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one MODEL.json")
+        path = self.chosen_one("one MODEL.json")
         thing = self.cloud(context)
-        models.onto(thing, read_model(chosen[0]))
+        models.onto(thing, read_model(path))
         thing.beyond_mocap_cloud.use_model = True
-        self.report({"INFO"}, f"{thing.name}: model from {chosen[0].name}")
+        self.report({"INFO"}, f"{thing.name}: model from {path.name}")
 
 
 class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, ExportHelper):
@@ -276,7 +248,6 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
     bl_label = "Save Marker Model"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
@@ -305,7 +276,6 @@ named where the others tell. Reconstruct does the same for itself"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Clean it."""
         from ..beyond_mocap.markers.cleaning.clean import clean
 
         name, trial, clusters = order
@@ -338,7 +308,6 @@ clip of the library where asked for"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Reconstruct it."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
         made = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
@@ -374,7 +343,6 @@ the timeline"""
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
-        """Find it."""
         from ..beyond_mocap.markers.release.release import release
 
         name, trial, motion, settings = order
@@ -382,7 +350,6 @@ the timeline"""
         return name, release(trial, motion, settings)
 
     def apply(self, scene, result):
-        """Ball, timeline, figures."""
         name, found = result
         thing = scene.objects.get(name)
         if not is_cloud(thing):

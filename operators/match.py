@@ -8,13 +8,13 @@ import bpy
 from bpy.props import BoolProperty, CollectionProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas, channels, session
+from ..scene.core import channels, session, window
 from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import as_setting
-from ..scene.match import cameras, child, load, order, ours, reading, show
+from ..scene.match import cameras, child, load, order, ours, show
 from ..scene.match.settings import active_of, typed
 from ..scene.rigs import export, rig
-from .verb import BackgroundVerb, DroppedIntoView, ExportVerb, Verb
+from .verb import NEEDS_LIBRARY, BackgroundVerb, DroppedIntoView, ExportVerb, Verb
 
 MAKING = 0.85
 """Of the bar, the share of making where a match is made and shown."""
@@ -57,11 +57,8 @@ The first minute is chosen"""
     bl_idname = "beyond_mocap.read_match"
     bl_label = "Read Match"
     kind = "match file"
-
-    filepath: StringProperty(
-        name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
-        description="A tracking file; empty: the one that is chosen in the panel",
-    )
+    filepath: StringProperty(name="File", subtype="FILE_PATH", options={"SKIP_SAVE"},
+                             description="A tracking file; empty: the one that is chosen in the panel")
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -69,19 +66,18 @@ The first minute is chosen"""
         """Which files. Of those that are dropped together the largest is read, which is the tracking: others are found
         beside it."""
         dropped = [Path(self.directory, name) for name in sorted(file.name for file in self.files) if name]
-        chosen = str(max(dropped, key=_size)) if self.directory and dropped else self.filepath
-        return reading.order_of(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
+        sizes = {path: path.stat().st_size if path.is_file() else 0 for path in dropped}
+        chosen = str(max(dropped, key=sizes.get)) if self.directory and dropped else self.filepath
+        return order.reading_order(context.scene.beyond_mocap_match, bpy.path.abspath(chosen) if chosen else "")
 
     @staticmethod
-    def work(order, progress, cancelled, hurry):
-        """Read them."""
-        return reading.work(order, progress)
+    def work(asked, progress, cancelled, hurry):
+        return order.read_match(asked, progress)
 
     def apply(self, scene, result):
-        """The list."""
-        order, read = result
+        asked, read = result
         match = scene.beyond_mocap_match
-        reading.fill(match, order, read)
+        order.fill_match(match, asked, read)
         for line in match.report.splitlines()[:6]:
             self.report({"INFO"}, line)
         self.report({"INFO"}, f"{len(read.players)} players, {match.length_s / 60.0:.1f} minutes, {read.provider}")
@@ -96,15 +92,8 @@ class BEYOND_MOCAP_FH_match(DroppedIntoView, bpy.types.FileHandler):
     bl_file_extensions = ".csv;.json;.jsonl;.xml;.dat"  # dropped texts are words; tracking as text is chosen by name
 
 
-def _size(path: Path) -> int:
-    """Bytes of a file; 0 where there is none."""
-    return path.stat().st_size if path.is_file() else 0
-
-
-WHOM = (
-    ("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
-    ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"),
-)
+WHOM = (("ALL", "All", "Tick everybody"), ("NONE", "None", "Tick nobody"), ("home", "Home", "Tick the home team alone"),
+        ("away", "Away", "Tick the away team alone"), ("ONE", "Chosen", "Tick the chosen player alone"))
 
 
 class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
@@ -112,22 +101,14 @@ class BEYOND_MOCAP_OT_tick_match(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.tick_match"
     bl_label = "Tick Players"
-
     whom: EnumProperty(name="Whom", items=WHOM, default="ALL", description="Who is ticked")
-
-    @classmethod
-    def poll(cls, context):
-        """There is a list."""
-        cls.poll_message_set("Press Read Match first")
-        return len(context.scene.beyond_mocap_match.players) > 0
+    needs = "Press Read Match first", lambda context: len(context.scene.beyond_mocap_match.players) > 0
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         return next(item[2] for item in WHOM if item[0] == properties.whom)
 
     def do(self, context):
-        """Set the ticks."""
         match = context.scene.beyond_mocap_match
         chosen = active_of(match)
         for player in match.players:
@@ -143,15 +124,8 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
     bl_label = "Make Match"
     kind = "match"
     left = "cancelled; what is finished is kept, and pressed again it goes on there"
-
-    @classmethod
-    def poll(cls, context):
-        """A library and a match."""
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Choose a tracking file of a match, or drop one into the view, first")
-        return bool(context.scene.beyond_mocap_match.tracking_file)
+    needs = (*NEEDS_LIBRARY, "Choose a tracking file of a match, or drop one into the view, first",
+             lambda context: bool(context.scene.beyond_mocap_match.tracking_file))
 
     def order(self, context):
         """The command line, and what is shown of its results."""
@@ -163,9 +137,8 @@ Blender stays free. ESC cancels: what is finished is kept, and pressing again go
         """Make it in a process of its own, then expand it."""
         arguments, wanted, library = asked
         notes = child.run(arguments, lambda done, text: progress(MAKING * done, text), cancelled)
-        shown = load.scenery(
-            wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text), cancelled
-        )
+        shown = load.scenery(wanted, library, lambda done, text: progress(MAKING + (1.0 - MAKING) * done, text),
+                             cancelled)
         return wanted, shown, notes
 
 
@@ -176,25 +149,15 @@ the one that is shown"""
     bl_idname = "beyond_mocap.show_match"
     bl_label = "Show Match"
     kind = "match"
-
-    @classmethod
-    def poll(cls, context):
-        """A library and a folder."""
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Press Make Match, or choose the folder of a made match, first")
-        match = context.scene.beyond_mocap_match
-        return bool(match.folder or match.made)
+    needs = (*NEEDS_LIBRARY, "Press Make Match, or choose the folder of a made match, first",
+             lambda context: bool((match := context.scene.beyond_mocap_match).folder or match.made))
 
     def order(self, context):
-        """Folder and span."""
         wanted = order.wanted(context.scene, order.folder_to_show(context.scene))
         return wanted, self.known_library(wanted)
 
     @staticmethod
     def work(asked, progress, cancelled, hurry):
-        """Expand it."""
         wanted, library = asked
         return wanted, load.scenery(wanted, library, progress, cancelled), ()
 
@@ -202,11 +165,7 @@ the one that is shown"""
 class ShownMatchVerb(Verb):
     """A verb about the match that is shown."""
 
-    @classmethod
-    def poll(cls, context):
-        """The match that is shown."""
-        cls.poll_message_set("Press Make Match or Show Match first")
-        return bool(ours.bodies(context.scene))
+    needs = "Press Make Match or Show Match first", lambda context: bool(ours.bodies(context.scene))
 
 
 class BEYOND_MOCAP_OT_match_second(ShownMatchVerb, bpy.types.Operator):
@@ -215,12 +174,10 @@ seconds"""
 
     bl_idname = "beyond_mocap.match_second"
     bl_label = "Go to Match Second"
-
     seconds: FloatProperty(name="Second", options={"SKIP_SAVE"}, description="Of the match's clock")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID in the feed; empty: nobody")
 
     def invoke(self, context, _event):
-        """Ask which second."""
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
@@ -234,21 +191,19 @@ seconds"""
             expected = f"{typed(shown.shown_start)} to {typed(end)} s"
             raise InputError("match", f"{typed(self.seconds)} s is not shown", expected,
                              "choose From and To around it and press Show Match")
-        body = self.body(scene)
+        body = _body_of(scene, self.player) if self.player else None
         scene.frame_set(frame)
         if body is not None and body.name in context.view_layer.objects and context.mode == "OBJECT":
-            for other in context.selected_objects:
-                other.select_set(False)
-            body.select_set(True)
-            context.view_layer.objects.active = body
+            window.select_only(context, body)
 
-    def body(self, scene) -> bpy.types.Object | None:
-        """The player's armature; InputError where he is not shown."""
-        known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
-        if self.player and self.player not in known:
-            raise InputError("match", f"{self.player} is not shown", f"one of {', '.join(map(str, known))}",
-                             "tick the player and press Show Match")
-        return known.get(self.player)
+
+def _body_of(scene: bpy.types.Scene, player: str) -> bpy.types.Object:
+    """A player's armature; InputError where the player is not shown."""
+    known = {thing.get(ours.PLAYER): thing for thing in ours.bodies(scene)}
+    if player not in known:
+        raise InputError("match", f"{player} is not shown", f"one of {', '.join(map(str, known))}",
+                         "tick the player and press Show Match")
+    return known[player]
 
 
 def _last(scene: bpy.types.Scene) -> int:
@@ -257,10 +212,8 @@ def _last(scene: bpy.types.Scene) -> int:
     return round(max((action.frame_range[1] for action in actions if action is not None), default=scene.frame_end))
 
 
-WHICH = (
-    ("STAND", "Broadcast", "From the stand, following the ball"),
-    ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"),
-)
+WHICH = (("STAND", "Broadcast", "From the stand, following the ball"),
+         ("EYES", "Eyes", "Through the eyes of the player chosen in the list, or of the selected one"))
 
 
 class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
@@ -268,13 +221,11 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.match_camera"
     bl_label = "Match Camera"
-
     which: EnumProperty(name="Which", items=WHICH, default="STAND", description="The camera to look through")
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="ID of the player; empty: the chosen one")
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button shows."""
         return next(item[2] for item in WHICH if item[0] == properties.which)
 
     def do(self, context):
@@ -287,24 +238,19 @@ class BEYOND_MOCAP_OT_match_camera(ShownMatchVerb, bpy.types.Operator):
         if camera is None:
             raise InputError("match", "no camera in the stand", "the one that was laid", "press Show Match again")
         scene.camera = camera
-        area = None if bpy.app.background else areas.largest(context.window.screen, "VIEW_3D")
+        area = None if bpy.app.background else window.largest_editor(context.window.screen, "VIEW_3D")
         if area is not None:
             _look_through(context, area)
 
     def who(self, context) -> bpy.types.Object:
         """The armature that is meant: named, selected, or chosen in the list."""
-        shown = {thing.get(ours.PLAYER): thing for thing in ours.bodies(context.scene)}
-        active = context.active_object
+        shown, active = ours.bodies(context.scene), context.active_object
         if not self.player and active is not None:
             active = active.parent if active.type == "MESH" else active
-            if active in shown.values() and active.select_get():
+            if active in shown and active.select_get():
                 return active
         chosen = active_of(context.scene.beyond_mocap_match)
-        wanted = self.player or (chosen.feed_id if chosen is not None else next(iter(shown)))
-        if wanted not in shown:
-            raise InputError("match", f"{wanted} is not shown", f"one of {', '.join(map(str, shown))}",
-                             "tick the player and press Show Match")
-        return shown[wanted]
+        return _body_of(context.scene, self.player or (chosen.feed_id if chosen else shown[0].get(ours.PLAYER)))
 
 
 def _look_through(context, area: bpy.types.Area) -> None:
@@ -324,21 +270,14 @@ scene stays as it is"""
 
     bl_idname = "beyond_mocap.match_export"
     bl_label = "Export Match"
-
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=FORMATS, default="GLB", description="Form of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="What the root bone carries")
     pitch: BoolProperty(name="Pitch", default=True, description="Grass, lines and goals, too")
-
-    @classmethod
-    def poll(cls, context):
-        """A match is shown."""
-        cls.poll_message_set("Show a match first")
-        return bool(ours.bodies(context.scene))
+    needs = "Show a match first", lambda context: bool(ours.bodies(context.scene))
 
     def do(self, context):
-        """Write it."""
         path = self.out()
         scene = context.scene
         everybody = ours.bodies(scene)

@@ -18,10 +18,8 @@ from ..scene.passes.settings import SAMPLES
 from .verb import BackgroundVerb, ImportVerb, Verb
 
 ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
-WHAT = (
-    ("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
-    ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"),
-)  # fmt: skip
+WHAT = (("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
+        ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"))
 ACTIVE = {"players": "active_player", "passes": "active_pass"}
 RING = 3.0  # metres from the 3D cursor at which players are added
 
@@ -32,13 +30,11 @@ stands, which becomes his body"""
 
     bl_idname = "beyond_mocap.passes_list"
     bl_label = "Players and Passes"
-
     rows: EnumProperty(name="List", items=ROWS, options={"SKIP_SAVE"}, description="Which list")
     what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="What to do")
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         one = {"players": "player", "passes": "pass"}[properties.rows]
         if properties.what == "ADD" and one == "player":
             return (
@@ -51,7 +47,6 @@ stands, which becomes his body"""
         return f"Move the picked {one} {moved}" if moved else f"Remove the picked {one}"
 
     def do(self, context):
-        """One of four things."""
         settings = context.scene.beyond_mocap_passes
         if self.what == "ADD":
             return add_player(context) if self.rows == "players" else add_pass(settings)
@@ -95,17 +90,15 @@ def add_player(context) -> None:
     free = body is not None and body.type == "ARMATURE" and body.library is None and body.select_get()
     if free and not any(row.body == body for row in settings.players):
         place, facing = standing(scene, body)
-        row = order.add_player(
-            context, body.name if not _taken(settings, body.name) else order.free_name(settings), place, facing
-        )
+        taken = any(row.name == body.name for row in settings.players)
+        row = order.add_player(context, order.free_name(settings) if taken else body.name, place, facing)
         row.body = body
         return
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
-    order.add_player(
-        context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)), angle + math.pi
-    )
+    order.add_player(context, order.free_name(settings), (x + ring * math.cos(angle), y + ring * math.sin(angle)),
+                     angle + math.pi)
 
 
 def standing(scene, body) -> tuple[tuple[float, float], float]:
@@ -134,10 +127,6 @@ def add_pass(settings) -> None:
     settings.active_pass = len(settings.passes) - 1
 
 
-def _taken(settings, name: str) -> bool:
-    return any(row.name == name for row in settings.players)
-
-
 class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):
     """Let the players of the list pass the ball as the passes say: bodies and ball are made where there are none. Each
 flight leaves one body at its strike and arrives at the next one at his"""
@@ -145,18 +134,11 @@ flight leaves one body at its strike and arrives at the next one at his"""
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
     kind = "passes"
-
-    live: BoolProperty(
-        name="Live", options={"HIDDEN", "SKIP_SAVE"},
-        description="Whether an edit asked for it: what is wrong is told in the panel",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """Players and passes."""
-        cls.poll_message_set("Add players and passes, or take a sample")
-        settings = context.scene.beyond_mocap_passes
-        return len(settings.players) > 1 and len(settings.passes) > 0
+    live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
+                       description="Whether an edit asked for it: what is wrong is told in the panel")
+    needs = ("Add players and passes, or take a sample",
+             lambda context: len((settings := context.scene.beyond_mocap_passes).players) > 1
+             and len(settings.passes) > 0)
 
     def order(self, context):
         """What is to be made."""
@@ -164,18 +146,14 @@ flight leaves one body at its strike and arrives at the next one at his"""
             examples.forget()
         return make.order_of(context.scene)
 
-    @staticmethod
-    def work(order, progress, cancelled, hurry):
-        """Play the scene."""
-        return make.work(order, progress, cancelled, hurry)
+    work = staticmethod(make.work)
 
     def apply(self, scene, result):
         """Bodies and ball; what is shown is what was ordered."""
         rows = {row.name for row in scene.beyond_mocap_passes.players}
         if missing := [one.name for one in result.passes.players if one.name not in rows]:
-            raise InputError(
-                "players", f"{missing[0]} is gone from the list meanwhile", "the same players", "press Make Scene again"
-            )
+            raise InputError("players", f"{missing[0]} is gone from the list meanwhile", "the same players",
+                             "press Make Scene again")
         make.show(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
@@ -200,15 +178,9 @@ lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
     bl_label = "Clear Scene"
-
-    @classmethod
-    def poll(cls, context):
-        """A scene is shown."""
-        cls.poll_message_set("Nothing has been made")
-        return bool(context.scene.beyond_mocap_passes.made_of)
+    needs = "Nothing has been made", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):
-        """Take it away."""
         make.clear(context.scene)
 
 
@@ -218,7 +190,6 @@ their bodies"""
 
     bl_idname = "beyond_mocap.passes_sample"
     bl_label = "Sample Scene"
-
     sample: EnumProperty(name="Sample", items=SAMPLES, description="Which one")
 
     def do(self, context):
@@ -233,15 +204,12 @@ class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.passes_from_json"
     bl_label = "Scene from File"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
         """Read it, fill the lists."""
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one SCENE.json")
-        order.fill(context, scene_json.read_scene(chosen[0]))
+        path = self.chosen_one("one SCENE.json")
+        order.fill(context, scene_json.read_scene(path))
 
 
 class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
@@ -251,7 +219,6 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
     bl_label = "Scene to File"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
@@ -259,6 +226,5 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
         missing = examples.left_out(context.scene.beyond_mocap_passes)
-        self.report(
-            {"WARNING" if missing else "INFO"}, ", ".join(filter(None, (f"written to {self.filepath}", missing)))
-        )
+        self.report({"WARNING" if missing else "INFO"},
+                    ", ".join(filter(None, (f"written to {self.filepath}", missing))))

@@ -8,22 +8,18 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..scene.core import linked
+from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.path_editing import curve, keep_apart, measure, riders
 from ..scene.path_editing.settings import choose, meant
 from ..scene.path_editing.settings import riders as riders_in
-from .verb import Verb
+from .verb import NEEDS_NO_EDITING, Verb
 
 
 class RiderVerb(Verb):
     """A verb about the riders that are meant; greyed, with the reason, where there are none."""
 
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
+    needs = "Select an armature that rides a path, or its curve", lambda context: bool(meant(context))
 
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
@@ -39,31 +35,22 @@ back"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
-
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
     straight: BoolProperty(name="Straight", description="A straight line, as long, instead of the original path")
-
-    @classmethod
-    def poll(cls, context):
-        """Armatures."""
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature with a motion, and a curve if it is to ride that one")
-        return bool(bodies(context))
+    needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and a curve if it is to ride that one",
+             lambda context: bool(bodies(context)))
 
     def do(self, context):
         """Curve and motion, and the curve active."""
-        linked.refuse(context.scene)
+        channels.check_local(context.scene)
         chosen = bodies(context)
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
         riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
         if drawn is None and len(riding) == len(chosen):
-            raise InputError(
-                f"armature {chosen[0].name}", "it rides already", "one that does not", "edit its curve, or press Leave"
-            )
+            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not",
+                             "edit its curve, or press Leave")
         begun, used = [], drawn
         try:
             for body, _ in riding if drawn is not None else ():
@@ -91,9 +78,8 @@ back"""
 def bodies(context) -> list[bpy.types.Object]:
     """The armatures that are meant: the active one first, and the other selected ones."""
     active = context.view_layer.objects.active
-    return sorted(
-        (thing for thing in context.selected_objects if thing.type == "ARMATURE"), key=lambda thing: thing != active
-    )
+    return sorted((thing for thing in context.selected_objects if thing.type == "ARMATURE"),
+                  key=lambda thing: thing != active)
 
 
 class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
@@ -102,20 +88,12 @@ curve before is removed if it was made here and nobody else rides it"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"
-
     shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Where the new curve runs")
     count: IntProperty(**COUNT)
     kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
     degree: IntProperty(**DEGREE)
-
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature that rides a path, or its curve")
-        return bool(meant(context))
+    needs = (*NEEDS_NO_EDITING, "Select an armature that rides a path, or its curve",
+             lambda context: bool(meant(context)))
 
     def do(self, context):
         """The curve, which becomes active."""
@@ -133,7 +111,6 @@ class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
     bl_label = "Update Path"
 
     def do(self, context):
-        """All that are meant."""
         for body in meant(context):
             riders.renew(context.scene, body, anew=True)
             measure.measure(context.scene, body)
@@ -145,29 +122,16 @@ as little as it takes. Of two or more selected riders only those give way; other
 
     bl_idname = "beyond_mocap.path_apart"
     bl_label = "Keep Apart"
-
-    distance: FloatProperty(
-        name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
-        description="Metres between the middles of two bodies at least",
-    )
-    delay: FloatProperty(
-        name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds that a rider may begin later",
-    )
-    detour: FloatProperty(
-        name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
-        description="Metres that a rider may leave its path to the side",
-    )
+    distance: FloatProperty(name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
+                            description="Metres between the middles of two bodies at least")
+    delay: FloatProperty(name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2,
+                         unit="TIME_ABSOLUTE", description="Seconds that a rider may begin later")
+    detour: FloatProperty(name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
+                          description="Metres that a rider may leave its path to the side")
     clear: BoolProperty(name="Clear", description="Only take back the waits and detours of before")
-
-    @classmethod
-    def poll(cls, context):
-        """A rider."""
-        cls.poll_message_set("Let an armature ride a path first (Edit Path)")
-        return bool(riders_in(context.scene))
+    needs = "Let an armature ride a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
 
     def do(self, context):
-        """Find out, then ask."""
         from ..beyond_mocap.path_editing.apart import Limits
         from ..beyond_mocap.path_editing.follower import Change
 
@@ -217,24 +181,16 @@ again"""
     bl_label = "Leave"
 
     def do(self, context):
-        """All that are meant."""
         chosen = meant(context)
         riders.leave(*chosen)
         riders.back_to(context, chosen)
 
 
-DIRECTIONS = (
-    ("LEFT", "Left", "Along -X", "TRIA_LEFT", 0),
-    ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
-    ("FORTH", "Forth", "Along Y", "TRIA_UP", 2),
-    ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
-    ("UP", "Up", "Along Z", "SORT_DESC", 4),
-    ("DOWN", "Down", "Along -Z", "SORT_ASC", 5),
-)
-AXES = {
-    "LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
-    "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0),
-}
+DIRECTIONS = (("LEFT", "Left", "Along -X", "TRIA_LEFT", 0), ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
+              ("FORTH", "Forth", "Along Y", "TRIA_UP", 2), ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
+              ("UP", "Up", "Along Z", "SORT_DESC", 4), ("DOWN", "Down", "Along -Z", "SORT_ASC", 5))
+AXES = {"LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
+        "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0)}
 
 
 class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):
@@ -243,18 +199,10 @@ looks"""
 
     bl_idname = "beyond_mocap.nudge_points"
     bl_label = "Nudge Points"
-
     direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
-    step: FloatProperty(
-        name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
-        description="Metres to move; 0: the step that is set in the panel Path Editing",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """A curve is in edit mode."""
-        cls.poll_message_set("Select a curve and go into edit mode with Tab first")
-        return context.mode == "EDIT_CURVE"
+    step: FloatProperty(name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
+                        description="Metres to move; 0: the step that is set in the panel Path Editing")
+    needs = "Select a curve and go into edit mode with Tab first", lambda context: context.mode == "EDIT_CURVE"
 
     @classmethod
     def description(cls, _context, properties):
@@ -267,9 +215,7 @@ looks"""
     def do(self, context):
         """Blender's own move, since it knows what a handle does to its neighbour."""
         step = (self.step or context.scene.beyond_mocap.nudge_step) * units_per_metre(context.scene)
-        moved = bpy.ops.transform.translate(
-            "EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]], orient_type="GLOBAL", mirror=False,
-            use_proportional_edit=False, snap=False,
-        )
+        moved = bpy.ops.transform.translate("EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]],
+                                            orient_type="GLOBAL", mirror=False, use_proportional_edit=False, snap=False)
         if moved != {"FINISHED"}:
             raise InputError("nudge", "no control point selected", "one or more", "click on a point first")

@@ -11,9 +11,9 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.tracking.providers import PROVIDERS
 from ..scene.core.settings import active_player, as_setting
 from ..scene.player import dots, pins, tracks
-from ..scene.player.subject import show
-from ..scene.result import bake, plans, preview
+from ..scene.result import bake, preview
 from ..scene.timeline import strip_events, strips, word_checks
+from ..scene.timeline.strips import show_player
 from .verb import DroppedIntoView, ImportVerb, Verb
 
 SHIRTS = {"home": ((0.75, 0.05, 0.06), (0.80, 0.30, 0.04)), "away": ((0.04, 0.14, 0.70), (0.02, 0.45, 0.60))}
@@ -27,18 +27,15 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
     bl_idname = "beyond_mocap.import_tracking"
     bl_label = "Import Tracking"
     filename_ext = ".csv"
-
     filter_glob: StringProperty(default="*.csv;*.txt;*.dat;*.json;*.jsonl;*.xml", options={"HIDDEN"})
     metadata: StringProperty(
         name="Metadata", subtype="FILE_PATH",
         description="The provider's second file; where empty, one beside the tracking file whose name fits is taken",
     )
-    provider: EnumProperty(
-        name="Provider",
-        items=[("AUTO", "Guess", "By what the file looks like")]
-        + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
-        description="Whose form the file has",
-    )
+    provider: EnumProperty(name="Provider",
+                           items=[("AUTO", "Guess", "By what the file looks like")]
+                           + [(one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values()],
+                           description="Whose form the file has")
 
     def paths(self) -> list[str]:
         """The chosen files, without the words that lie beside a chosen CSV and come along with it."""
@@ -81,7 +78,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text of the same name b
             dots.ensure(context, player)
             if player.annotation_file:
                 track = tracks.read_track(context.scene.beyond_mocap, player)
-                words = plans.written_words(player, context.scene.beyond_mocap.rate, track)
+                words = strips.written_words(player, context.scene.beyond_mocap.rate, track)
                 strips.write(context, player, words)
                 self.tell_words(context.scene, player, words)
             elif not player.feed_id:
@@ -149,28 +146,18 @@ class BEYOND_MOCAP_OT_choose_player(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.choose_player"
     bl_label = "Show Player's Strips"
-
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="The player's name; empty is the active one"
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """There is a player, and objects can be selected."""
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Leave the mode that you are in first")
-            return False
-        cls.poll_message_set("Import tracking in step 2 first")
-        return len(context.scene.beyond_mocap.players) > 0
+    player: StringProperty(name="Player", options={"SKIP_SAVE"},
+                           description="The player's name; empty is the active one")
+    needs = ("Leave the mode that you are in first", lambda context: context.mode == "OBJECT",
+             "Import tracking in step 2 first", lambda context: len(context.scene.beyond_mocap.players) > 0)
 
     def do(self, context):
-        """Select the dot."""
         settings = context.scene.beyond_mocap
         active = settings.players[min(settings.active_player, len(settings.players) - 1)]
         player = settings.players.get(self.player) if self.player else active
         if player is None:
             raise InputError("player", f"{self.player!r} is not in the list", "a player in the list")
-        show(context, player)
+        show_player(context, player)
         if context.area is not None and context.area.type == "NLA_EDITOR":
             context.space_data.dopesheet.show_only_selected = True
 
@@ -181,12 +168,9 @@ strips. Files of earlier versions need this once; texts and files stay as they a
 
     bl_idname = "beyond_mocap.place_players"
     bl_label = "Bring to the Timeline"
-
-    @classmethod
-    def poll(cls, context):
-        """A player without strips."""
-        cls.poll_message_set("Every player in the list has strips already")
-        return any(strips.dot_of(player, context.scene) is None for player in context.scene.beyond_mocap.players)
+    needs = ("Every player in the list has strips already",
+             lambda context: any(strips.dot_of(player, context.scene) is None
+                                 for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Read all tracks and words, then place those that could be read, and tell the others."""
@@ -196,7 +180,7 @@ strips. Files of earlier versions need this once; texts and files stay as they a
             if strips.dot_of(player, context.scene) is not None:
                 continue
             try:
-                read.append((player, plans.written_words(player, settings.rate, tracks.read_track(settings, player))))
+                read.append((player, strips.written_words(player, settings.rate, tracks.read_track(settings, player))))
             except InputError as error:
                 troubles.append(f"{player.name}: {error}")
         if not read:
@@ -214,12 +198,7 @@ strips come along"""
 
     bl_idname = "beyond_mocap.player_from_dot"
     bl_label = "Add Player from Dot"
-
-    @classmethod
-    def poll(cls, context):
-        """A dot without a player is selected."""
-        cls.poll_message_set("Select a dot that was appended from another file first")
-        return bool(dots.orphans(context))
+    needs = "Select a dot that was appended from another file first", lambda context: bool(dots.orphans(context))
 
     def do(self, context):
         """A player for each; his strips are laid for this scene's clock."""
@@ -240,12 +219,7 @@ what his track is drawn by stay in the scene, and a preview that he shows is kep
 
     bl_idname = "beyond_mocap.remove_player"
     bl_label = "Remove Player"
-
-    @classmethod
-    def poll(cls, context):
-        """There is one."""
-        cls.poll_message_set("The list of players is empty")
-        return active_player(context.scene.beyond_mocap) is not None
+    needs = "The list of players is empty", lambda context: active_player(context.scene.beyond_mocap) is not None
 
     def do(self, context):
         """Remove it and choose its neighbour."""

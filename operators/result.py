@@ -9,7 +9,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.synthesis import FORMS
 from ..scene.core import session
 from ..scene.core.settings import active_player
-from ..scene.result import error_curves, preview, variants
+from ..scene.result import preview, quality
 from .turns import show_automatic
 from .verb import Verb
 
@@ -17,9 +17,8 @@ from .verb import Verb
 class ResultVerb(Verb):
     """A verb about the results of one player, or of all that are ticked."""
 
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="Whose result; empty: of all ticked players",
-    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"},
+                           description="Whose result; empty: of all ticked players")
 
     def chosen(self, context) -> list:
         """The players in question."""
@@ -37,15 +36,9 @@ Accepted results can be turned from one form into the other"""
 
     bl_idname = "beyond_mocap.accept"
     bl_label = "Accept"
-
     form: EnumProperty(name="As", items=FORMS, default="ACTION", description="What the take becomes")
-
-    @classmethod
-    def poll(cls, context):
-        """There is something to accept."""
-        cls.poll_message_set("Synthesize first")
-        return any(player.use and (player.take or player.result.state != "NONE")
-                   for player in context.scene.beyond_mocap.players)
+    needs = ("Synthesize first", lambda context: any(player.use and (player.take or player.result.state != "NONE")
+                                                     for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Show those that are not shown yet, then keep all."""
@@ -73,15 +66,11 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.discard"
     bl_label = "Discard"
-
-    @classmethod
-    def poll(cls, context):
-        """There is a preview."""
-        cls.poll_message_set("No preview is shown: Synthesize shows one")
-        return any(player.use and player.result.state == "PREVIEW" for player in context.scene.beyond_mocap.players)
+    needs = ("No preview is shown: Synthesize shows one",
+             lambda context: any(player.use and player.result.state == "PREVIEW"
+                                 for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        """Every chosen player's preview."""
         players = [player for player in self.chosen(context) if player.result.state == "PREVIEW"]
         if not players:
             raise InputError("discard", "no preview is shown", "a preview", "synthesize first")
@@ -98,21 +87,16 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.preview"
     bl_label = "Preview"
-
     number: IntProperty(name="Variant", default=1, min=1, description="Which one, from 1")
-
-    @classmethod
-    def poll(cls, context):
-        """There are variants."""
-        cls.poll_message_set("No variants: press Variants first")
-        return any(player.result.variants for player in context.scene.beyond_mocap.players)
+    needs = ("No variants: press Variants first",
+             lambda context: any(player.result.variants for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Show it on the named player, or the active one."""
         player = self.chosen(context)[0] if self.player else active_player(context.scene.beyond_mocap)
         if player is None:
             raise InputError("preview", "no player is chosen", "a player with variants", "choose one in step 2")
-        variants.show(context, player, self.number - 1)
+        preview.show_variant(context, player, self.number - 1)
         show_automatic(context, player)
 
 
@@ -122,26 +106,25 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
 
     bl_idname = "beyond_mocap.error_curves"
     bl_label = "Error Curves"
-
     remove: BoolProperty(name="Remove", options={"SKIP_SAVE"}, description="Take the curves away instead")
 
     @classmethod
     def poll(cls, context):
-        """A player with a body."""
         cls.poll_message_set("Synthesize first: the active player has no body with a take")
         player = active_player(context.scene.beyond_mocap)
-        return player is not None and player.body is not None and bool(player.take or error_curves.there(player.body))
+        if player is None or player.body is None:
+            return False
+        return bool(player.take) or quality.has_error_curves(player.body)
 
     def do(self, context):
-        """Write or remove them."""
         player = active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
             raise InputError("error curves", "no player with a body", "one", "synthesize first")
         if player.body.library is not None or player.body.data.library is not None:
             raise InputError(f"body {player.body.name}", "linked from another file", "an armature of this file")
         if self.remove:
-            error_curves.remove(player.body)
+            quality.remove_error_curves(player.body)
         elif session.made(player.take) is None:
             raise InputError(f"player {player.name}", "no take in this session", "a take", "synthesize again")
         else:
-            error_curves.write(context.scene, player)
+            quality.write_error_curves(context.scene, player)

@@ -26,11 +26,7 @@ from .verb import ExportVerb, Verb
 class MapVerb(Verb):
     """A verb about the chosen rig's map."""
 
-    @classmethod
-    def poll(cls, context):
-        """A rig is chosen."""
-        cls.poll_message_set("Choose a rig first")
-        return context.scene.beyond_mocap.rig.target is not None
+    needs = "Choose a rig first", lambda context: context.scene.beyond_mocap.rig.target is not None
 
 
 class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
@@ -40,7 +36,6 @@ class BEYOND_MOCAP_OT_map_bones(MapVerb, bpy.types.Operator):
     bl_label = "Map Bones"
 
     def do(self, context):
-        """Fill the list anew."""
         settings = context.scene.beyond_mocap.rig
         settings.told = f"Bones mapped {rig.fill(settings, again=True)}"
 
@@ -70,11 +65,9 @@ class BEYOND_MOCAP_OT_save_bone_map(MapVerb, bpy.types.Operator, ExportHelper):
     bl_label = "Save Bone Map"
     bl_options = {"REGISTER"}
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Write it."""
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose where to write it")
         settings = context.scene.beyond_mocap.rig
@@ -87,11 +80,9 @@ class BEYOND_MOCAP_OT_load_bone_map(MapVerb, bpy.types.Operator, ImportHelper):
     bl_idname = "beyond_mocap.load_bone_map"
     bl_label = "Load Bone Map"
     filename_ext = ".json"
-
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Read, check, show."""
         if not self.filepath:
             raise InputError("bone map", "no file given", "a .json file", "choose one")
         settings = context.scene.beyond_mocap.rig
@@ -105,12 +96,7 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.use_selected_rig"
     bl_label = "Use Active Armature"
-
-    @classmethod
-    def poll(cls, context):
-        """An armature is active."""
-        cls.poll_message_set("Select the rig first")
-        return context.object is not None and context.object.type == "ARMATURE"
+    needs = "Select the rig first", lambda context: context.object is not None and context.object.type == "ARMATURE"
 
     def do(self, context):
         """Choose it; its bones are mapped at once."""
@@ -118,15 +104,10 @@ class BEYOND_MOCAP_OT_use_selected_rig(Verb, bpy.types.Operator):
         context.scene.beyond_mocap.rig.target = context.object
 
 
-TARGETS = (
-    ("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
-    ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
-    (
-        "PLAYERS",
-        "All Ticked Players",
-        "Each ticked player's motion onto that player's rig, or a copy of the chosen one",
-    ),
-)
+TARGETS = (("CHOSEN", "The Chosen Rig", "The rig that the panel shows"),
+           ("SELECTED", "Selected Armatures", "The same motion onto every selected armature but the source"),
+           ("PLAYERS", "All Ticked Players",
+            "Each ticked player's motion onto that player's rig, or a copy of the chosen one"))
 
 
 class BEYOND_MOCAP_OT_bake_to_rig(Verb, bpy.types.Operator):
@@ -135,14 +116,11 @@ on the ground. What the rig played before is kept as an action"""
 
     bl_idname = "beyond_mocap.bake_to_rig"
     bl_label = "Bake to Rig"
-
-    targets: EnumProperty(
-        name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"}, description="Which rigs get the motion"
-    )
+    targets: EnumProperty(name="Onto", items=TARGETS, default="CHOSEN", options={"SKIP_SAVE"},
+                          description="Which rigs get the motion")
 
     @classmethod
     def poll(cls, context):
-        """A rig and something to bake."""
         settings = context.scene.beyond_mocap
         rigs = (settings.rig.target, *(player.rig for player in settings.players))
         if not any(rigs) and not any(o.type == "ARMATURE" for o in context.selected_objects):
@@ -214,17 +192,11 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.unbake"
     bl_label = "Remove Bake"
-
-    @classmethod
-    def poll(cls, context):
-        """A rig that was baked."""
-        cls.poll_message_set("The chosen rig plays nothing that was baked here")
-        target = context.scene.beyond_mocap.rig.target
-        playing = channels.playing(target)[0] if target is not None else None
-        return playing is not None and bool(playing.get(bake_record.MARK))
+    needs = ("The chosen rig plays nothing that was baked here",
+             lambda context: (target := context.scene.beyond_mocap.rig.target) is not None
+             and bool((channels.playing(target)[0] or {}).get(bake_record.MARK)))
 
     def do(self, context):
-        """Off with it."""
         bake_record.remove(context.scene.beyond_mocap.rig.target)
 
 
@@ -234,8 +206,7 @@ tolerances below"""
 
     bl_idname = "beyond_mocap.reduce_keys"
     bl_label = "Leave Out Keys"
-
-    poll = BEYOND_MOCAP_OT_unbake.poll
+    needs = BEYOND_MOCAP_OT_unbake.needs
 
     def do(self, context):
         """Fewer keys, told how many."""
@@ -295,7 +266,6 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.export_motion"
     bl_label = "Export Motion"
-
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Form of the file")
     engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Axes and units of")
@@ -304,14 +274,9 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
     own_rate: BoolProperty(name="Own Rate", default=False, description="At the rate that was synthesized")
     deform_only: BoolProperty(name="Deform Bones Only", default=True, description="Leave controls out")
     meshes: BoolProperty(name="Meshes", default=True, description="Export the meshes that the armature moves, too")
-
-    @classmethod
-    def poll(cls, context):
-        """Something to export."""
-        cls.poll_message_set("Synthesize and accept first, or select an armature that moves")
-        settings = context.scene.beyond_mocap
-        return bool(settings.players) or settings.rig.target is not None or any(
-            one.type == "ARMATURE" for one in context.selected_objects)
+    needs = ("Synthesize and accept first, or select an armature that moves",
+             lambda context: bool((settings := context.scene.beyond_mocap).players) or settings.rig.target is not None
+             or any(one.type == "ARMATURE" for one in context.selected_objects))
 
     def invoke(self, context, event):
         """The panel's choices, then the file browser."""
@@ -321,7 +286,6 @@ class BEYOND_MOCAP_OT_export_motion(ExportVerb, bpy.types.Operator):
         return super().invoke(context, event)
 
     def do(self, context):
-        """Write it."""
         path = self.out()
         rigs = self.rigs(context)
         wanted = export.Wanted(path, self.format, self.engine, rate=self.rate(context), root=self.root,
@@ -362,14 +326,8 @@ class BEYOND_MOCAP_OT_export_bvh(Verb, bpy.types.Operator, ExportHelper):
     bl_label = "Export BVH"
     bl_options = {"REGISTER"}
     filename_ext = ".bvh"
-
     filter_glob: StringProperty(default="*.bvh", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        """An armature."""
-        cls.poll_message_set("Select an armature first")
-        return context.object is not None and context.object.type == "ARMATURE"
+    needs = "Select an armature first", lambda context: context.object is not None and context.object.type == "ARMATURE"
 
     def do(self, context):
         """Read the action, write the file."""

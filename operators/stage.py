@@ -6,10 +6,10 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas
+from ..scene.core import window
 from ..scene.path_editing.settings import meant, riders
 from ..scene.stage import path_cameras, stage
-from .verb import Verb
+from .verb import NEEDS_NO_EDITING, Verb
 
 
 class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
@@ -17,11 +17,9 @@ class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.add_stage"
     bl_label = "Add Pitch, Light and Camera"
-
     camera: BoolProperty(name="Camera", default=True, description="Add a camera and look through it when rendering")
 
     def do(self, context):
-        """Make it."""
         stage.create(context, self.camera)
 
 
@@ -31,15 +29,8 @@ behind the active one. Pressed again it lays only those anew that nobody has mov
 
     bl_idname = "beyond_mocap.path_cameras"
     bl_label = "Path Cameras"
-
-    @classmethod
-    def poll(cls, context):
-        """Somebody rides a path; edit mode has an undo of its own, which knows nothing of cameras."""
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        if context.mode not in {"OBJECT", "POSE"}:
-            return False
-        cls.poll_message_set("Select an armature and press Edit Path first")
-        return bool(riders(context.scene))
+    needs = (*NEEDS_NO_EDITING,  # edit mode has an undo of its own, which knows nothing of cameras
+             "Select an armature and press Edit Path first", lambda context: bool(riders(context.scene)))
 
     def do(self, context):
         """Look at all of them, and lay the cameras."""
@@ -49,14 +40,12 @@ behind the active one. Pressed again it lays only those anew that nobody has mov
             self.report({"INFO"}, f"kept as you have changed them: {', '.join(kept)}")
 
 
-WHICH = (
-    ("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
-    ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
-    ("SIDE", "Side", "From the side, the path across the picture"),
-    ("QUARTER", "Quarter", "From three quarters, a little above"),
-    ("BEHIND", "Behind", "Behind the body, following it"),
-    ("FREE", "Free View", "The view as it was before, and the scene's own camera"),
-)
+WHICH = (("NEXT", "Next", "The next one; after the last the free view, from the free view the first"),
+         ("ABOVE", "Above", "From above, as a map: X to the right, Y up"),
+         ("SIDE", "Side", "From the side, the path across the picture"),
+         ("QUARTER", "Quarter", "From three quarters, a little above"),
+         ("BEHIND", "Behind", "Behind the body, following it"),
+         ("FREE", "Free View", "The view as it was before, and the scene's own camera"))
 VIEW = ("view_perspective", "view_location", "view_rotation", "view_distance")  # looking through a camera turns a view
 _free: dict[int, tuple] = {}  # by the area's pointer: its VIEW before the first of these cameras
 
@@ -66,14 +55,8 @@ class BEYOND_MOCAP_OT_path_camera(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.path_camera"
     bl_label = "Path Camera"
-
     which: EnumProperty(name="Which", items=WHICH, default="NEXT", description="The camera to look through")
-
-    @classmethod
-    def poll(cls, context):
-        """There are such cameras."""
-        cls.poll_message_set("Press Path Cameras in the panel Path Editing first")
-        return path_cameras.any_in(context.scene)
+    needs = "Press Path Cameras in the panel Path Editing first", lambda context: path_cameras.any_in(context.scene)
 
     @classmethod
     def description(cls, _context, properties):
@@ -107,7 +90,7 @@ def _view(context) -> bpy.types.Area | None:
         return None
     if context.area is not None and context.area.type == "VIEW_3D":
         return context.area
-    return areas.largest(context.window.screen, "VIEW_3D")
+    return window.largest_editor(context.window.screen, "VIEW_3D")
 
 
 def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:

@@ -20,12 +20,7 @@ Nothing from other machines gets in, and nothing is sent"""
     bl_idname = "beyond_mocap.stream_start"
     bl_label = "Start Stream"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        """One stream at a time."""
-        cls.poll_message_set("A stream is listened to already: press Stop Stream first")
-        return receiver.listener() is None
+    needs = "A stream is listened to already: press Stop Stream first", lambda context: receiver.listener() is None
 
     def do(self, context):
         """Bind the port and begin to listen."""
@@ -36,11 +31,7 @@ Nothing from other machines gets in, and nothing is sent"""
 class ListeningVerb(Verb):
     """A verb about the stream that is received."""
 
-    @classmethod
-    def poll(cls, context):
-        """The stream that is received."""
-        cls.poll_message_set("No stream is listened to: press Start Stream first")
-        return receiver.listener() is not None
+    needs = "No stream is listened to: press Start Stream first", lambda context: receiver.listener() is not None
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -51,7 +42,6 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        """Close."""
         receiver.stop()
         follow.tell()
 
@@ -59,11 +49,7 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
 class PlayingVerb(Verb):
     """A verb about what is played live."""
 
-    @classmethod
-    def poll(cls, context):
-        """What is played live."""
-        cls.poll_message_set("Nothing is played live: press Play Live first")
-        return play.rally() is not None
+    needs = "Nothing is played live: press Play Live first", lambda context: play.rally() is not None
 
 
 class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
@@ -74,7 +60,6 @@ class BEYOND_MOCAP_OT_stream_end(PlayingVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        """No more."""
         play.stop()
         told = context.window_manager.beyond_mocap_streaming
         told.playing, told.played = False, ""
@@ -85,10 +70,8 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.stream_keep"
     bl_label = "Keep Recording"
-
-    seconds: FloatProperty(
-        name="Seconds", default=10.0, min=0.1, max=20.0, description="How much of what has just been seen is kept"
-    )
+    seconds: FloatProperty(name="Seconds", default=10.0, min=0.1, max=20.0,
+                           description="How much of what has just been seen is kept")
 
     def do(self, context):
         """Read the ring, write an action."""
@@ -106,15 +89,10 @@ the scene plays on meanwhile"""
     bl_idname = "beyond_mocap.stream_play"
     bl_label = "Play Live"
     kind = "live"
-
     holder: StringProperty(name="Holder", description="Who has the ball first; empty: the first one of the list")
-
-    @classmethod
-    def poll(cls, context):
-        """Players."""
-        cls.poll_message_set("Add players and passes, or take a sample, under Passing Scene")
-        settings = context.scene.beyond_mocap_passes
-        return len(settings.players) > 1 and len(settings.passes) > 0
+    needs = ("Add players and passes, or take a sample, under Passing Scene",
+             lambda context: len((settings := context.scene.beyond_mocap_passes).players) > 1
+             and len(settings.passes) > 0)
 
     def order(self, context):
         """The passing scene, and who has the ball."""
@@ -123,7 +101,6 @@ the scene plays on meanwhile"""
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
-        """Everybody stands."""
         return play.begin(*order, progress, cancelled)
 
     def apply(self, scene, result):
@@ -136,11 +113,9 @@ class BEYOND_MOCAP_OT_stream_target(PlayingVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.stream_target"
     bl_label = "Pass To"
-
     number: IntProperty(name="Number", default=1, min=1, max=99, description="Of the player in the list, from 1")
 
     def do(self, context):
-        """Remember who."""
         names = [row.name for row in context.scene.beyond_mocap_passes.players]
         if self.number > len(names):
             raise InputError("player", f"number {self.number}", f"1 to {len(names)}")
@@ -155,12 +130,8 @@ as if you had just done it yourself"""
 
     bl_idname = "beyond_mocap.stream_act"
     bl_label = "Do as Selected"
-
-    @classmethod
-    def poll(cls, context):
-        """A rally, and an armature that shows how."""
-        cls.poll_message_set("Press Play Live, and select an armature whose motion has a strike")
-        return play.rally() is not None and subject(context) is not None
+    needs = ("Press Play Live, and select an armature whose motion has a strike",
+             lambda context: play.rally() is not None and subject(context) is not None)
 
     def do(self, context):
         """Find the strike; in a window the answer comes as soon as it is worked out."""

@@ -27,7 +27,6 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
     bl_idname = "beyond_mocap.study_render"
     bl_label = "Render Study Clips"
     bl_options = {"REGISTER"}
-
     directory: StringProperty(name="Study", subtype="DIR_PATH", description="Folder with study.json")
     engine: EnumProperty(
         name="Engine", default="AUTO", description="What renders",
@@ -43,7 +42,6 @@ under the neutral names of study.json. Movies are copied. Clips that are there a
     again: BoolProperty(name="Again", description="Also clips that are there already")
 
     def invoke(self, context, _event):
-        """Ask for the folder."""
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 

@@ -10,8 +10,9 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings import rows_of
 from ..scene.core import background, session
 from ..scene.core.settings import active_player
-from ..scene.result import freshness, orders, queue, stretch
+from ..scene.result import freshness, orders, plans, queue
 from .turns import TurnsVerb
+from .verb import NEEDS_LIBRARY
 
 
 class BEYOND_MOCAP_OT_synthesize(TurnsVerb, bpy.types.Operator):
@@ -30,14 +31,8 @@ After the file was opened again the take is made again as it was"""
     bl_idname = "beyond_mocap.update"
     bl_label = "Update"
     kind = "update"
-
-    @classmethod
-    def poll(cls, context):
-        """A take."""
-        if not super().poll(context):
-            return False
-        cls.poll_message_set("Synthesize first")
-        return any(player.use and player.take for player in context.scene.beyond_mocap.players)
+    needs = (*TurnsVerb.needs, "Synthesize first",
+             lambda context: any(player.use and player.take for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
         """Where something is out of date about some of the players, only those; the others stay untouched. Drawn tracks
@@ -56,13 +51,10 @@ class BEYOND_MOCAP_OT_update_live(TurnsVerb, bpy.types.Operator):
     bl_idname = "beyond_mocap.update_live"
     bl_label = "Live Update"
     bl_options = {"UNDO", "INTERNAL"}
-
     player: bpy.props.StringProperty(name="Player", description="Name of the player in the list", options={"SKIP_SAVE"})
-    kind: bpy.props.EnumProperty(
-        name="Kind", items=(("quick", "Quick", "By a narrow search"),
-                            ("whole", "Whole", "As well as can be, with figures")),
-        description="How it is made",
-    )
+    kind: bpy.props.EnumProperty(name="Kind", items=(("quick", "Quick", "By a narrow search"),
+                                                     ("whole", "Whole", "As well as can be, with figures")),
+                                 description="How it is made")
 
     def wanted(self, context):
         """The one player, from his take."""
@@ -81,18 +73,14 @@ class BEYOND_MOCAP_OT_cancel(bpy.types.Operator):
     bl_idname = "beyond_mocap.cancel"
     bl_label = "Cancel"
     bl_options = {"INTERNAL"}
-
     keep: BoolProperty(
         name="Finish Early", options={"SKIP_SAVE"},
         description="Come to an end with the best that has been found so far; players that wait are left as they are",
     )
-    player: StringProperty(
-        name="Player", options={"SKIP_SAVE"}, description="Only take this player out of the queue",
-    )
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only take this player out of the queue")
 
     @classmethod
     def description(cls, _context, properties):
-        """What this button does."""
         if properties.player:
             return f"Leave {properties.player} as it is: take it out of the queue"
         if properties.keep:
@@ -118,30 +106,21 @@ of an accepted result, of a selected span of words, or the preview range. All el
 
     bl_idname = "beyond_mocap.resynthesize_stretch"
     bl_label = "Resynthesize Stretch"
-
-    start: FloatProperty(
-        name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE", description="Second on the track's clock",
-    )
-    end: FloatProperty(
-        name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
-        description="Second on the track's clock; 0: as selected",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """A take."""
-        cls.poll_message_set("Synthesize first")
-        return any(player.take for player in context.scene.beyond_mocap.players)
+    start: FloatProperty(name="From", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
+                         description="Second on the track's clock")
+    end: FloatProperty(name="To", options={"SKIP_SAVE"}, unit="TIME_ABSOLUTE",
+                       description="Second on the track's clock; 0: as selected")
+    needs = "Synthesize first", lambda context: any(player.take for player in context.scene.beyond_mocap.players)
 
     def wanted(self, context):
         """The seconds that were named, or those of what is selected."""
         settings = context.scene.beyond_mocap
         if self.end > self.start:
-            player = settings.players.get(self.player) if self.player else stretch.player_shown(context.scene)
+            player = settings.players.get(self.player) if self.player else plans.player_shown(context.scene)
             if player is None:
                 raise InputError("a stretch made anew", f"no player {self.player!r}", "a player with a take")
             return [(player, orders.How("stretch", self.start, self.end))]
-        player, start, end = stretch.selected(context.scene)
+        player, start, end = plans.selected_stretch(context.scene)
         return [(player, orders.How("stretch", start, end))]
 
 
@@ -151,17 +130,9 @@ They are switched by the row of numbers; Accept keeps the one that is shown, the
 
     bl_idname = "beyond_mocap.variants"
     bl_label = "Variants"
-
     count: IntProperty(name="How Many", default=3, min=2, max=9, description="How many takes to choose from")
-
-    @classmethod
-    def poll(cls, context):
-        """A library and an active player."""
-        if not context.scene.beyond_mocap.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Import tracking and choose a player in step 2 first")
-        return active_player(context.scene.beyond_mocap) is not None
+    needs = (*NEEDS_LIBRARY, "Import tracking and choose a player in step 2 first",
+             lambda context: active_player(context.scene.beyond_mocap) is not None)
 
     def wanted(self, context):
         """The active player."""

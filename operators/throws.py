@@ -14,29 +14,19 @@ class AtTarget(BackgroundVerb):
     """What throwing and kicking share."""
 
     act = ""
-
-    @classmethod
-    def poll(cls, context):
-        """An armature."""
-        cls.poll_message_set("Select the armature that throws or kicks")
-        return thrower(context) is not None
+    needs = "Select the armature that throws or kicks", lambda context: thrower(context) is not None
 
     def order(self, context):
         """Who, from where, at what, when."""
         return order.order_of(context.scene, thrower(context), self.act)
 
-    @staticmethod
-    def work(order_, progress, cancelled, hurry):
-        """Make it."""
-        return made.work(order_, progress, cancelled, hurry)
+    work = staticmethod(made.work)
 
     def apply(self, scene, result):
-        """Armature, ball and figures."""
         body = scene.objects.get(result.order.body)
         if body is None or body.type != "ARMATURE":
-            raise InputError(
-                f"armature {result.order.body}", "it is gone meanwhile", "the same armature", "press again"
-            )
+            raise InputError(f"armature {result.order.body}", "it is gone meanwhile", "the same armature",
+                             "press again")
         shown.show(scene, body, result)
         for line in body.beyond_mocap_throw.told.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")
@@ -56,12 +46,8 @@ changed as little as it takes. Without a target the 3D cursor is aimed at. Press
 class ThrownVerb(Verb):
     """A verb about the throw or kick that is shown."""
 
-    @classmethod
-    def poll(cls, context):
-        """The meant armature shows one."""
-        cls.poll_message_set("Select an armature that throws or kicks")
-        body = thrower(context)
-        return body is not None and bool(body.beyond_mocap_throw.made)
+    needs = ("Select an armature that throws or kicks",
+             lambda context: (body := thrower(context)) is not None and bool(body.beyond_mocap_throw.made))
 
 
 class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):

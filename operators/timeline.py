@@ -8,24 +8,21 @@ import bpy
 from bpy.props import BoolProperty, FloatProperty, IntProperty, StringProperty
 
 from ..beyond_mocap.base.errors import InputError
-from ..scene.core import areas
+from ..scene.core import window
 from ..scene.core.live import soon
 from ..scene.core.settings import active_player
-from ..scene.player.subject import can_have, clock, name_of, subject, with_lanes
 from ..scene.result import bake
 from ..scene.timeline import lanes, lay_strips, moment_names, word_checks
 from ..scene.timeline.strip_lines import said
+from ..scene.timeline.strips import can_have_timeline, subject_clock, subject_name, subject_with_lanes, timeline_subject
 from .verb import Verb
 
 
 class TimelineVerb(Verb):
     """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
 
-    @classmethod
-    def poll(cls, context):
-        """There is somebody with strips."""
-        cls.poll_message_set("Import tracking in step 2 first, and bring its players to the timeline")
-        return subject(context) is not None
+    needs = ("Import tracking in step 2 first, and bring its players to the timeline",
+             lambda context: timeline_subject(context) is not None)
 
     def attempt(self, action):
         """As ever; the lines about words are worked out anew."""
@@ -37,23 +34,14 @@ class TimelineVerb(Verb):
 class WritingVerb(TimelineVerb):
     """A verb that brings the timeline about where there is none yet."""
 
-    @classmethod
-    def poll(cls, context):
-        """There is a player."""
-        cls.poll_message_set("Import tracking in step 2 first")
-        return can_have(context)
+    needs = "Import tracking in step 2 first", lambda context: can_have_timeline(context)
 
 
 class MomentVerb(TimelineVerb):
     """A verb for the picked key moment."""
 
-    @classmethod
-    def poll(cls, context):
-        """A key moment is picked."""
-        if not super().poll(context):
-            return False
-        cls.poll_message_set("Pick a key moment first: click its name in the NLA editor or in the list")
-        return is_picked(subject(context))
+    needs = (*TimelineVerb.needs, "Pick a key moment first: click its name in the NLA editor or in the list",
+             lambda context: is_picked(timeline_subject(context)))
 
 
 def is_picked(target: bpy.types.Object) -> bool:
@@ -65,7 +53,7 @@ def picked(target: bpy.types.Object) -> lanes.PlacedMoment:
     """The picked key moment; InputError where there is none."""
     found = next((moment for moment in lanes.moments(target) if moment.selected), None)
     if found is None:
-        raise InputError(name_of(target), "no key moment is picked", "one", "click its name in the NLA editor")
+        raise InputError(subject_name(target), "no key moment is picked", "one", "click its name in the NLA editor")
     return found
 
 
@@ -86,7 +74,7 @@ def draw_complaints(layout, context: bpy.types.Context, item) -> None:
 
 def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
     """The playhead, in seconds on the clock of the object's strips."""
-    return clock(context, target).seconds(context.scene.frame_current_final)
+    return subject_clock(context, target).seconds(context.scene.frame_current_final)
 
 
 class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
@@ -95,16 +83,12 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
     bl_idname = "beyond_mocap.show_timeline"
     bl_label = "Show Timeline"
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context):
-        """Somebody has a timeline."""
-        cls.poll_message_set("Import tracking in step 2 first")
-        return any(player.dot for player in context.scene.beyond_mocap.players)
+    needs = ("Import tracking in step 2 first",
+             lambda context: any(player.dot for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
         """Find or open it, show its sidebar and all strips."""
-        area = areas.editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
+        area = window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
         if area is None:
             return
         space = area.spaces.active
@@ -118,13 +102,13 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
 
 def _settle(scene: int) -> None:
     """What an editor takes only once it has been drawn: which tab is in front, and what it shows."""
-    for window in bpy.context.window_manager.windows:
-        for area in window.screen.areas:
-            if area.type != "NLA_EDITOR" or window.scene.session_uid != scene:
+    for shown in bpy.context.window_manager.windows:
+        for area in shown.screen.areas:
+            if area.type != "NLA_EDITOR" or shown.scene.session_uid != scene:
                 continue
             regions = {region.type: region for region in area.regions}
             regions["UI"].active_panel_category = "Beyond Mocap"
-            with bpy.context.temp_override(window=window, area=area, region=regions["WINDOW"]):
+            with bpy.context.temp_override(window=shown, area=area, region=regions["WINDOW"]):
                 bpy.ops.nla.view_all()
             area.tag_redraw()
 
@@ -135,19 +119,16 @@ goes to the next. Shift-click also brings the body into view"""
 
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"
-
-    seconds: FloatProperty(
-        name="Seconds", options={"SKIP_SAVE"}, description="Second on the tracking file's clock to go to"
-    )
+    seconds: FloatProperty(name="Seconds", options={"SKIP_SAVE"},
+                           description="Second on the tracking file's clock to go to")
     stops: StringProperty(
         name="Stops", options={"SKIP_SAVE"},
         description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to "
         "the first"
     )
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Whose body; empty: the active player's")
-    frame_view: BoolProperty(
-        name="Bring into View", options={"SKIP_SAVE"}, description="Move the 3D views so that the body is seen"
-    )
+    frame_view: BoolProperty(name="Bring into View", options={"SKIP_SAVE"},
+                             description="Move the 3D views so that the body is seen")
 
     def invoke(self, context, event):
         """As the button was pressed."""
@@ -174,10 +155,7 @@ goes to the next. Shift-click also brings the body into view"""
         if body is None or body.name not in context.view_layer.objects:
             return
         if context.view_layer.objects.active is None or context.mode == "OBJECT":
-            for other in context.selected_objects:
-                other.select_set(False)
-            body.select_set(True)
-            context.view_layer.objects.active = body
+            window.select_only(context, body)
         if self.frame_view and not bpy.app.background:
             _bring_into_view(context)
 
@@ -196,18 +174,17 @@ class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.go_to_moment"
     bl_label = "Go to Key Moment"
-
     strip: StringProperty(name="Strip", options={"SKIP_SAVE"}, description="The strip whose action has the marker")
     index: IntProperty(name="Index", options={"SKIP_SAVE"}, description="Which marker of the action it is")
 
     def do(self, context):
         """Pick it, and go there."""
-        target = subject(context)
+        target = timeline_subject(context)
         strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
         markers = strip.action.pose_markers
         if not 0 <= self.index < len(markers):
-            raise InputError(name_of(target), f"key moment {self.index} of strip {strip.name!r}", "one that is there",
-                             f"it has {len(markers)}")
+            found = f"key moment {self.index} of strip {strip.name!r}"
+            raise InputError(subject_name(target), found, "one that is there", f"it has {len(markers)}")
         lay_strips.pick(target, strip.name, self.index)
         context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))
 
@@ -292,11 +269,9 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.add_moment"
     bl_label = "Add Key Moment"
-
     words: StringProperty(name="Words", default="kick", description="What happens there; -word for what must not be")
 
     def invoke(self, context, _event):
-        """Ask for the words."""
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
@@ -305,10 +280,9 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
 
     def do(self, context):
-        """Set the marker, picked."""
         said(self.words, 0.0)
-        target = with_lanes(context)
-        lay_strips.add_moment(target, said(self.words, playhead(context, target)), clock(context, target))
+        target = subject_with_lanes(context)
+        lay_strips.add_moment(target, said(self.words, playhead(context, target)), subject_clock(context, target))
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
@@ -316,12 +290,10 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.move_moment"
     bl_label = "Move Key Moment"
-
     frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="By how many frames; 0 moves to the playhead")
 
     def do(self, context):
-        """Put its marker there."""
-        target = subject(context)
+        target = timeline_subject(context)
         moment, clock = picked(target), lanes.written_for(target)
         time = clock.seconds(moment.frame + self.frames) if self.frames else playhead(context, target)
         lay_strips.change_moment(target, moment.strip, moment.index, replace(moment.key, time=time))
@@ -334,7 +306,6 @@ class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
     bl_label = "Delete Key Moment"
 
     def do(self, context):
-        """Remove its marker."""
-        target = subject(context)
+        target = timeline_subject(context)
         moment = picked(target)
         lay_strips.remove_moment(target, moment.strip, moment.index)

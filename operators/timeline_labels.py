@@ -13,10 +13,9 @@ from ..beyond_mocap.base.errors import InputError
 from ..scene.core.settings import active_player, as_setting
 from ..scene.library import recordings
 from ..scene.player import tracks
-from ..scene.player.subject import clip, clock, name_of, subject, with_lanes
-from ..scene.result import plans
-from ..scene.timeline import clip_annotation, lanes, lay_strips, strips
+from ..scene.timeline import lanes, lay_strips, strips
 from ..scene.timeline.strip_lines import said, words_of
+from ..scene.timeline.strips import active_clip, subject_clock, subject_name, subject_with_lanes, timeline_subject
 from .timeline import TimelineVerb, WritingVerb, draw_complaints, playhead, selected_spans
 from .verb import ImportVerb, Verb
 
@@ -27,19 +26,15 @@ playhead on"""
 
     bl_idname = "beyond_mocap.add_span"
     bl_label = "Add Span"
-
     words: StringProperty(name="Words", default="running", description="What is done there; -word for what must not be")
     start: FloatProperty(
         name="From", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
         description="Seconds on the track's clock; where From and To are equal, the preview range or the playhead",
     )
-    end: FloatProperty(
-        name="To", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
-        description="Seconds on the track's clock",
-    )
+    end: FloatProperty(name="To", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
+                       description="Seconds on the track's clock")
 
     def invoke(self, context, _event):
-        """Ask for the words."""
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
@@ -48,20 +43,19 @@ playhead on"""
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0, 1.0))
 
     def do(self, context):
-        """Lay the strip."""
         given = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
         start, end = given if self.end != self.start else self.stretch(context)
         if end <= start:
             raise InputError("span", f"the end {end:g} is not after the start {start:g}", "START < END")
         span = said(self.words, start, end)
-        target = with_lanes(context)
-        lay_strips.add_span(target, span, clock(context, target))
+        target = subject_with_lanes(context)
+        lay_strips.add_span(target, span, subject_clock(context, target))
 
     @staticmethod
     def stretch(context) -> tuple[float, float]:
         """The preview range, or a second from the playhead on."""
-        scene, there = context.scene, subject(context) or with_lanes(context)
-        time = clock(context, there)
+        scene, there = context.scene, timeline_subject(context) or subject_with_lanes(context)
+        time = subject_clock(context, there)
         if scene.use_preview_range:
             return time.seconds(scene.frame_preview_start), time.seconds(scene.frame_preview_end)
         return time.seconds(scene.frame_current), time.seconds(scene.frame_current) + 1.0
@@ -74,14 +68,14 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
     bl_label = "Split Span at Playhead"
 
     def do(self, context):
-        """Each becomes two."""
-        target = subject(context)
+        target = timeline_subject(context)
         time, clock = playhead(context, target), lanes.written_for(target)
         frame = clock.whole(time)
         there = [span for span in lanes.spans(target) if span.first < frame < span.last and not span.automatic]
         there = [span for span in there if span.selected] or there
         if not there:
-            raise InputError(name_of(target), "no span is under the playhead", "one", "put the playhead into a strip")
+            found = "no span is under the playhead"
+            raise InputError(subject_name(target), found, "one", "put the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
@@ -95,19 +89,19 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context):
-        """Two strips are selected."""
         if not super().poll(context):
             return False
         cls.poll_message_set("Select two or more strips of one player first")
-        chosen = [strip for _, strip in lanes.strips(subject(context)) if strip.select]
+        chosen = [strip for _, strip in lanes.strips(timeline_subject(context)) if strip.select]
         return sum(strip.action.beyond_mocap.kind != "moments" for strip in chosen) > 1
 
     def do(self, context):
         """The first one is lengthened, the others go; their key moments stay."""
-        target = subject(context)
+        target = timeline_subject(context)
         chosen = selected_spans(target)
         if len(chosen) < 2:
-            raise InputError(name_of(target), "fewer than two spans are selected", "two or more", "select their strips")
+            found = "fewer than two spans are selected"
+            raise InputError(subject_name(target), found, "two or more", "select their strips")
         inner = [moment.key for moment in lanes.moments(target) if moment.strip in {span.strip for span in chosen[1:]}]
         for placed in chosen[1:]:
             lay_strips.remove_span(target, placed.strip)
@@ -128,13 +122,13 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
     def do(self, context):
         """Change all whose words have a side."""
-        target = subject(context)
+        target = timeline_subject(context)
         moments = [moment for moment in lanes.moments(target) if moment.selected]
         sided = [placed for placed in moments if _mirrored(placed.key) != placed.key]
         spans = [placed for placed in selected_spans(target) if _mirrored(placed.span) != placed.span]
         if not (sided or spans):
             found = "nothing with left or right is selected"
-            raise InputError(name_of(target), found, "a span or key moment with a side", "select one")
+            raise InputError(subject_name(target), found, "a span or key moment with a side", "select one")
         for placed in sided:
             lay_strips.change_moment(target, placed.strip, placed.index, _mirrored(placed.key))
         for placed in spans:
@@ -152,7 +146,6 @@ or that the library does not have, are told while you type"""
 
     bl_idname = "beyond_mocap.edit_words"
     bl_label = "Edit Words"
-
     words: StringProperty(name="Words", description="What is done; -word for what must not be")
 
     def invoke(self, context, _event):
@@ -163,16 +156,16 @@ or that the library does not have, are told while you type"""
 
     def load(self, context):
         """The words that are there now."""
-        self.words = words_of(_item(chosen(subject(context))))
+        placed = chosen(timeline_subject(context))
+        self.words = words_of(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
 
     def draw(self, context):
         """The words, and what is wrong with them."""
         self.layout.prop(self, "words", text="")
-        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(subject(context))))
+        draw_complaints(self.layout, context, lambda: _said(self.words, chosen(timeline_subject(context))))
 
     def do(self, context):
-        """Write them."""
-        target = subject(context)
+        target = timeline_subject(context)
         placed = chosen(target)
         item = _said(self.words, placed)
         if isinstance(placed, lanes.PlacedMoment):
@@ -189,12 +182,8 @@ def chosen(target: bpy.types.Object):
         return moments[0]
     if len(spans) != 1:
         found = f"no key moment is picked and {len(spans)} spans are selected"
-        raise InputError(name_of(target), found, "one of them", "click the name of a key moment, or one strip")
+        raise InputError(subject_name(target), found, "one of them", "click the name of a key moment, or one strip")
     return spans[0]
-
-
-def _item(placed):
-    return placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span
 
 
 def _said(words: str, placed):
@@ -209,22 +198,18 @@ text. Strips and key moments that are there now are replaced"""
 
     bl_idname = "beyond_mocap.read_words"
     bl_label = "Words from Text or File"
-
-    @classmethod
-    def poll(cls, context):
-        """A player with a text or a file."""
-        player = active_player(context.scene.beyond_mocap)
-        cls.poll_message_set("Import tracking, and choose a file or text with words in step 2 first")
-        return player is not None and (player.annotation_text is not None or bool(player.annotation_file))
+    needs = ("Import tracking, and choose a file or text with words in step 2 first",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
+             and (player.annotation_text is not None or bool(player.annotation_file)))
 
     def do(self, context):
         """Read all of it, then lay the strips."""
         settings = context.scene.beyond_mocap
         player = active_player(settings)
-        timeline = plans.written_words(player, settings.rate, tracks.read_track(settings, player))
+        timeline = strips.written_words(player, settings.rate, tracks.read_track(settings, player))
         strips.write(context, player, timeline)
         told = f"{player.name}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments"
-        self.report({"INFO"}, f"{told} from {plans.written_in(player)}")
+        self.report({"INFO"}, f"{told} from {strips.written_in(player)}")
 
 
 class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
@@ -236,12 +221,12 @@ becomes the player's text in step 2"""
 
     def do(self, context):
         """Into the player's text, where there is one, else a new one."""
-        target = subject(context)
-        words = format_timeline(lanes.read(target, name_of(target)))
-        player = None if clip(context) else active_player(context.scene.beyond_mocap)
+        target = timeline_subject(context)
+        words = format_timeline(lanes.read(target, subject_name(target)))
+        player = None if active_clip(context) else active_player(context.scene.beyond_mocap)
         text = player.annotation_text if player else None
         if text is None or text.library is not None:
-            text = bpy.data.texts.new(f"{name_of(target)} words")
+            text = bpy.data.texts.new(f"{subject_name(target)} words")
         text.clear()
         text.write(words)
         if player:
@@ -257,15 +242,13 @@ seconds"""
     bl_label = "Export Words"
     bl_options = {"REGISTER"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
-        """Write the file."""
         if not self.filepath:
             raise InputError("export", "no file given", "a place to write", "choose one")
-        target = subject(context)
-        words = format_timeline(lanes.read(target, name_of(target)))
+        target = timeline_subject(context)
+        words = format_timeline(lanes.read(target, subject_name(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
             file.write(words)
         self.report({"INFO"}, f"{words.count(chr(10))} lines in {self.filepath}")
@@ -279,31 +262,25 @@ clip whose armature is active. Strips that are there are replaced"""
     bl_label = "Import Words"
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".txt"
-
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
-
-    @classmethod
-    def poll(cls, context):
-        """Somebody whose words they are."""
-        cls.poll_message_set("Import tracking first: words belong to a player")
-        return bool(clip_annotation.shown(context.object)) or active_player(context.scene.beyond_mocap) is not None
+    needs = ("Import tracking first: words belong to a player",
+             lambda context: bool(recordings.shown_clip(context.object))
+             or active_player(context.scene.beyond_mocap) is not None)
 
     def do(self, context):
         """Read the file, then lay the strips."""
-        chosen = self.chosen()
-        if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", "one text of words")
+        path = self.chosen_one("one text of words")
         settings, rig = context.scene.beyond_mocap, context.object
-        if clip_annotation.shown(rig):
-            motion, _ = recordings.read(settings, clip_annotation.shown(rig), rig[recordings.FOLDER])
-            timeline, whose = read_timeline(chosen[0], motion.fps), rig.name
-            clip_annotation.lay(rig, context.scene, motion, timeline)
+        if recordings.shown_clip(rig):
+            motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
+            timeline, whose = read_timeline(path, motion.fps), rig.name
+            recordings.lay_words(rig, context.scene, motion, timeline)
         else:
             player = active_player(settings)
             start = float(tracks.read_track(settings, player).times[0])
-            timeline, whose = read_timeline(chosen[0], settings.rate, start), player.name
+            timeline, whose = read_timeline(path, settings.rate, start), player.name
             strips.write(context, player, timeline)
-            player.annotation_file = as_setting(str(chosen[0]))
+            player.annotation_file = as_setting(str(path))
         self.report({"INFO"}, f"{whose}: {len(timeline.spans)} spans and {len(timeline.keys)} key moments")
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.motion.track.drawn import FASTEST
-from ..scene.core import linked
+from ..scene.core import channels, window
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player, is_track
 from ..scene.player import dots, drawn_track, pins
@@ -22,24 +22,15 @@ m/s: Set Speed, or its Radius in the Item tab (Alt-S). At a point of speed 0 he 
 
     bl_idname = "beyond_mocap.draw_track"
     bl_label = "Draw Track"
-
-    @classmethod
-    def poll(cls, context):
-        """Object mode, since something is added."""
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        return context.mode == "OBJECT"
+    needs = "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT"
 
     def do(self, context):
-        """Curve, player, dot."""
         scene = context.scene
-        linked.refuse(scene)
+        channels.check_local(scene)
         name = free_name("Drawn", {player.name for player in scene.beyond_mocap.players})
         drawn = drawn_track.create(context, f"{name} curve", context.collection)
         add_player(context, drawn, name)
-        for other in context.selected_objects:
-            other.select_set(False)
-        drawn.select_set(True)
-        context.view_layer.objects.active = drawn
+        window.select_only(context, drawn)
         self.report({"INFO"}, f"{name}: bend the curve in edit mode (Tab), set speeds of its points, then Synthesize")
 
 
@@ -60,22 +51,16 @@ another armature's hips), by keys or constraints. It becomes a new player's, or 
 
     bl_idname = "beyond_mocap.track_object"
     bl_label = "Track from Object"
-
-    for_active: bpy.props.BoolProperty(
-        name="Active Player", description="Give it to the active player in the list instead of adding one",
-        options={"SKIP_SAVE"},
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """An object that may be one."""
-        cls.poll_message_set("Choose a curve or a moving object first")
-        return context.object is not None and is_track(None, context.object)
+    for_active: bpy.props.BoolProperty(name="Active Player",
+                                       description="Give it to the active player in the list instead of adding one",
+                                       options={"SKIP_SAVE"})
+    needs = ("Choose a curve or a moving object first",
+             lambda context: context.object is not None and is_track(None, context.object))
 
     def do(self, context):
         """Read it, so that what is wrong is told, and take it."""
         scene, chosen = context.scene, context.object
-        linked.refuse(scene)
+        channels.check_local(scene)
         player = active_player(scene.beyond_mocap)
         if self.for_active and player is None:
             raise InputError("players", "none in the list", "a player", "switch Active Player off to add one")
@@ -95,32 +80,21 @@ At a point of speed 0 the player waits. The speed is the point's Radius, the wai
 
     bl_idname = "beyond_mocap.set_speed"
     bl_label = "Set Speed"
-
-    speed: bpy.props.FloatProperty(
-        name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2, description="Metres per second; 0: a stop"
-    )
-    wait: bpy.props.FloatProperty(
-        name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds that are waited at a stop",
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """A curve."""
-        cls.poll_message_set("Choose a drawn curve first")
-        return context.object is not None and context.object.type == "CURVE"
+    speed: bpy.props.FloatProperty(name="Speed", default=3.0, min=0.0, max=FASTEST, precision=2,
+                                   description="Metres per second; 0: a stop")
+    wait: bpy.props.FloatProperty(name="Wait", default=1.0, min=0.01, max=60.0, precision=2, unit="TIME_ABSOLUTE",
+                                  description="Seconds that are waited at a stop")
+    needs = "Choose a drawn curve first", lambda context: context.object is not None and context.object.type == "CURVE"
 
     def invoke(self, context, _event):
-        """Ask for the numbers."""
         points = chosen(context.object)
         if points:
             self.speed, self.wait = min(points[0].radius, FASTEST), points[0].weight_softbody
         return context.window_manager.invoke_props_dialog(self)
 
     def do(self, context):
-        """Set them."""
         drawn = context.object
-        linked.refuse(drawn, drawn.data)
+        channels.check_local(drawn, drawn.data)
         points = chosen(drawn)
         if not points:
             raise InputError(f"curve {drawn.name}", "no point selected", "one or more", "select points in edit mode")
@@ -143,30 +117,21 @@ with G; time and hold stand in the list of pins"""
 
     bl_idname = "beyond_mocap.add_pin"
     bl_label = "Add Pin"
-
     part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="What is held")
     at: bpy.props.EnumProperty(
         name="At", items=(("BODY", "Body", "Where the part is now"), ("CURSOR", "3D Cursor", "At the 3D cursor")),
         description="Where the pin is made",
     )
-    hold: bpy.props.FloatProperty(
-        name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
-        description="Seconds for which it stays there"
-    )
-
-    @classmethod
-    def poll(cls, context):
-        """A player, and object mode."""
-        if active_player(context.scene.beyond_mocap) is None:
-            cls.poll_message_set("Import tracking or draw a track in step 2 first")
-            return False
-        cls.poll_message_set("Leave edit mode first (Tab)")
-        return context.mode == "OBJECT"
+    hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",
+                                  description="Seconds for which it stays there")
+    needs = ("Import tracking or draw a track in step 2 first",
+             lambda context: active_player(context.scene.beyond_mocap) is not None,
+             "Leave edit mode first (Tab)", lambda context: context.mode == "OBJECT")
 
     def do(self, context):
         """Find the place, refuse a second pin of the part at that time, make it."""
         scene, part = context.scene, self.part.replace("_", " ")
-        linked.refuse(scene)
+        channels.check_local(scene)
         player, seconds = active_player(scene.beyond_mocap), pins.second_now(scene)
         for other in player.pins:
             if other.part == self.part and other.time <= seconds + self.hold and seconds <= other.time + other.hold:
@@ -185,16 +150,11 @@ class BEYOND_MOCAP_OT_remove_pin(Verb, bpy.types.Operator):
 
     bl_idname = "beyond_mocap.remove_pin"
     bl_label = "Remove Pin"
-
-    @classmethod
-    def poll(cls, context):
-        """A pin."""
-        player = active_player(context.scene.beyond_mocap)
-        cls.poll_message_set("The active player has no pins")
-        return player is not None and len(player.pins) > 0
+    needs = ("The active player has no pins",
+             lambda context: (player := active_player(context.scene.beyond_mocap)) is not None and len(player.pins) > 0)
 
     def do(self, context):
         """Remove it and choose its neighbour."""
-        linked.refuse(context.scene)
+        channels.check_local(context.scene)
         player = active_player(context.scene.beyond_mocap)
         pins.remove(player, min(player.active_pin, len(player.pins) - 1))

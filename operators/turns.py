@@ -18,10 +18,10 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, session
 from ..scene.core.window import start_clock, stop_clock
 from ..scene.player import dots
-from ..scene.result import freshness, orders, plans, preview, quality, queue, variants
+from ..scene.result import freshness, orders, plans, preview, quality, queue
 from ..scene.timeline import strips
 from .library import summary
-from .verb import Verb
+from .verb import NEEDS_LIBRARY, Verb
 
 
 def written(context, player, order, result) -> None:
@@ -30,18 +30,16 @@ def written(context, player, order, result) -> None:
     context.scene.beyond_mocap.library_holds = summary(result.library)
     shown = []
     for one in result.takes:
-        lines = {
-            "quality": quality.quality(one.report),
-            "moments": quality.moments(one.report),
-            "warnings": quality.warnings(one.report, order.warnings, result.library.notes),
-            "recipe": json.dumps(one.recipe),
-            "made_of": json.dumps(result.made_of),
-        }
+        lines = {"quality": quality.quality_lines(one.report),
+                 "moments": quality.moment_lines(one.report),
+                 "warnings": quality.warning_lines(one.report, order.warnings, result.library.notes),
+                 "recipe": json.dumps(one.recipe),
+                 "made_of": json.dumps(result.made_of)}
         shown.append((session.keep_take(one.plan, one.take, one.report), lines))
     preview.show(context, player, *shown[0])
     if player.drawn_track is not None:
         dots.renew(context, player)
-    variants.keep(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
+    preview.keep_variants(player, [(name, lines, one.report) for (name, lines), one in zip(shown, result.takes)])
     freshness.dirty()
     show_automatic(context, player)
 
@@ -65,16 +63,8 @@ class TurnsVerb(Verb):
 
     player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Only this one; empty: all ticked players")
     kind = "whole"
-
-    @classmethod
-    def poll(cls, context):
-        """A library and a player."""
-        settings = context.scene.beyond_mocap
-        if not settings.library_folder:
-            cls.poll_message_set("Choose the library's folder in step 1 first")
-            return False
-        cls.poll_message_set("Import tracking and tick a player in step 2 first")
-        return any(player.use for player in settings.players)
+    needs = (*NEEDS_LIBRARY, "Import tracking and tick a player in step 2 first",
+             lambda context: any(player.use for player in context.scene.beyond_mocap.players))
 
     def wanted(self, context):
         """The named player, or every ticked one."""
@@ -230,9 +220,8 @@ class TurnsVerb(Verb):
             self.tell(f"{entry.player} keeps changing, its take is dropped; press {self.bl_label} again", "WARNING")
         else:
             self.tell(f"{entry.player} has changed meanwhile and is made again")
-            queue.add(queue.Entry(
-                entry.scene, player.name, entry.how, order=None, fingerprint="", tries=entry.tries + 1,
-            ))
+            queue.add(queue.Entry(entry.scene, player.name, entry.how, order=None, fingerprint="",
+                                  tries=entry.tries + 1))
 
     def over(self, context):
         """Nothing waits any more."""

@@ -12,14 +12,30 @@ from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import background, window
 from ..scene.rigs import export
 
+NEEDS_LIBRARY = ("Choose the library's folder in step 1 first",
+                 lambda context: bool(context.scene.beyond_mocap.library_folder))
+NEEDS_NO_EDITING = "Leave edit mode first (Tab)", lambda context: context.mode in {"OBJECT", "POSE"}
+
 
 class Verb:
     """An operator whose `do(context)` does the work; where it raises, the trouble is reported and nothing has changed.
 
     `do` reads and computes first and touches the scene last, so that a step that fails leaves the scene as it was.
+    needs: what the user is told where the operator is greyed, and a function of the context that is true where it can
+    be called; as many pairs of these as there are, asked in turn.
     """
 
     bl_options = {"REGISTER", "UNDO"}
+    needs = ()
+
+    @classmethod
+    def poll(cls, context):
+        """Whether what it needs is there."""
+        for message, is_met in zip(cls.needs[::2], cls.needs[1::2]):
+            if not is_met(context):
+                cls.poll_message_set(message)
+                return False
+        return True
 
     def execute(self, context):
         """Do it now."""
@@ -46,7 +62,6 @@ class ImportVerb(Verb, ImportHelper):
     """A verb that reads files: chosen in the file browser, dropped into a view, or named by a script."""
 
     bl_options = {"REGISTER", "UNDO", "PRESET"}
-
     directory: StringProperty(subtype="DIR_PATH", options={"SKIP_SAVE", "HIDDEN"})
     files: CollectionProperty(type=bpy.types.OperatorFileListElement, options={"SKIP_SAVE", "HIDDEN"})
 
@@ -62,6 +77,13 @@ class ImportVerb(Verb, ImportHelper):
         if names:
             return [Path(self.directory or Path(self.filepath).parent, name) for name in names]
         return [Path(bpy.path.abspath(self.filepath))] if self.filepath else []
+
+    def chosen_one(self, expected: str) -> Path:
+        """The one chosen file; InputError where there are none or several."""
+        chosen = self.chosen()
+        if len(chosen) != 1:
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", expected)
+        return chosen[0]
 
 
 class DroppedIntoView:

@@ -1,4 +1,5 @@
-"""Ball & Passes: the panel and its parts about the ball: tracked, struck, carried, aimed."""
+"""Ball & Passes: the panel and its parts: players who keep a ball going; the ball tracked, struck, carried, aimed; live
+streams, in which a user's own motion arrives while it is made."""
 
 from __future__ import annotations
 
@@ -6,18 +7,22 @@ import bpy
 
 from ..scene.ball.settings import aimed_ball
 from ..scene.passes.settings import active_row, ball_of, picture_icon, subject, told_lines
-from .passes import passing
-from .stream import live, stream
 from .tab import Step, paragraph, section, split, table
 
 LINE = 20.0  # pixels of a line of the interface, at a scale of 1
+
+STREAM_ICONS = {"receiving": "CHECKMARK", "waiting": "SORTTIME", "stopped": "BLANK1"}
+
+PART_ICONS = {
+    "foot": "MOD_DYNAMICPAINT", "head": "USER", "chest": "OUTLINER_OB_ARMATURE", "hand": "VIEW_PAN", "tool": "MOD_BEVEL"
+}  # fmt: skip
+KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
 
 
 class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
     """Touches that were solved from tracking."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One touch."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         named = row.split(factor=0.62)
@@ -53,9 +58,8 @@ def tracked(panel, layout, context) -> None:
         table(layout, settings.solved.splitlines())
     if not len(settings.touches):
         return
-    layout.template_list(
-        "BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch", rows=5
-    )
+    layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
+                         rows=5)
     if touch := active_row(settings.touches, settings.active_touch):
         layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
         row = layout.row(align=True)
@@ -97,13 +101,10 @@ def hits(layout, context) -> None:
 def carried(layout, context) -> None:
     """Who carries the ball and when."""
     settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
-    layout.label(
-        text=ball.name if ball is not None else "No ball: select one", icon="SPHERE" if ball is not None else "INFO"
-    )
-    layout.label(
-        text=body.name if body is not None else "No armature: select one",
-        icon="ARMATURE_DATA" if body is not None else "INFO",
-    )
+    layout.label(text=ball.name if ball is not None else "No ball: select one",
+                 icon="SPHERE" if ball is not None else "INFO")
+    layout.label(text=body.name if body is not None else "No armature: select one",
+                 icon="ARMATURE_DATA" if body is not None else "INFO")
     row = layout.row(align=True)
     row.prop(settings, "hold_part", text="")
     row.prop(settings, "hold_side", text="")
@@ -138,8 +139,7 @@ def of_aimed_ball(layout, ball) -> None:
     row.label(text=ball.name, icon="SPHERE")
     row.prop(settings, "live", text="", icon="LINKED" if settings.live else "UNLINKED")
     row.operator("beyond_mocap.leave_aim", text="", icon="X")
-    column = layout.column()
-    column.use_property_split, column.use_property_decorate = True, False
+    column = split(layout)
     column.enabled = not settings.handed
     column.prop(settings, "target")
     column.row().prop(settings, "way", expand=True)
@@ -174,3 +174,184 @@ def physics(layout, context, ball) -> None:
     else:
         text = f"To Physics from Frame {context.scene.frame_current}"
         row.operator("beyond_mocap.ball_to_physics", icon="PHYSICS", text=text)
+
+
+def stream(layout, context) -> None:
+    """Where to listen, how it does, and the last strike."""
+    settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
+    column = split(layout)
+    chosen = column.column()
+    chosen.enabled = not told.on
+    for name in ("protocol", "port", "clip", "unit", "part", "side", "threshold"):
+        chosen.prop(settings, name)
+    column.prop(settings, "body")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.stream_start", icon="PLAY")
+    row.operator("beyond_mocap.stream_stop", icon="SNAP_FACE")
+    if told.line:
+        paragraph(layout, told.line, STREAM_ICONS.get(told.state, "ERROR"))
+    if not told.on:
+        return
+    table(layout, told.figures.splitlines())
+    if told.hit:
+        layout.label(text=f"Last strike: {told.hit}", icon="KEYTYPE_EXTREME_VEC")
+    layout.operator("beyond_mocap.stream_keep", icon="REC")
+
+
+def live(panel, layout, context) -> None:
+    """Who has the ball, and to whom it goes."""
+    settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
+    column = split(layout)
+    column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
+    column.prop(settings, "bounces")
+    row = layout.row(align=True)
+    row.operator("beyond_mocap.stream_play", icon="OUTLINER_OB_ARMATURE")
+    row.operator("beyond_mocap.stream_end", icon="SNAP_FACE")
+    layout.operator("beyond_mocap.stream_act", icon="ARMATURE_DATA")
+    panel.progress(context, "live")
+    for line in told.played.splitlines():
+        paragraph(layout, line, "BLANK1")
+
+
+class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
+    """The players of a passing scene."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        row = layout.row(align=True)
+        row.prop(item, "name", text="", emboss=False)
+        row.label(text="", icon=PART_ICONS[item.part])
+        shirt = row.row()
+        shirt.ui_units_x = 1.0
+        shirt.prop(item, "shirt", text="")
+        if item.place is None:
+            row.label(text="", icon="ERROR")
+
+
+class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
+    """The passes, one after the other."""
+
+    def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        row = layout.row(align=True)
+        row.label(text=f"{item.who} to {item.to}", icon=KIND_ICONS[item.kind])
+        bounces = row.row()
+        bounces.active, bounces.alignment = False, "RIGHT"
+        bounces.label(
+            text=f"{item.bounces} {'bounce' if item.bounces == 1 else 'bounces'}" if item.bounces else "direct"
+        )
+        if item.error != "none":
+            row.label(text="", icon="CANCEL")
+
+
+def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
+    """A list with what adds to it, takes away and moves."""
+    row = layout.row()
+    row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active_propname=active, rows=3)
+    column = row.column(align=True)
+    for what, icon in (("ADD", "ADD"), ("REMOVE", "REMOVE"), ("UP", "TRIA_UP"), ("DOWN", "TRIA_DOWN")):
+        button = column.operator(f"beyond_mocap.{verb}", text="", icon=icon)
+        button.rows, button.what = rows, what
+
+
+def passing(panel, layout, context) -> None:
+    """Players, passes, ball, and what comes of them."""
+    settings = context.scene.beyond_mocap_passes
+    row = layout.row(align=True)
+    row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
+    row.operator("beyond_mocap.passes_from_json", text="", icon="IMPORT")
+    row.operator("beyond_mocap.passes_to_json", text="", icon="EXPORT")
+    lists(layout, "passers", settings, rows="players", active="active_player", verb="passes_list")
+    if player := active_row(settings.players, settings.active_player):
+        of_player(layout, player)
+    lists(layout, "passes", settings, rows="passes", active="active_pass", verb="passes_list")
+    if one := active_row(settings.passes, settings.active_pass):
+        of_pass(layout, settings, one)
+    row = layout.row(align=True)
+    row.scale_y = 1.3
+    row.operator("beyond_mocap.passes_make", icon="PLAY")
+    row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
+    row.operator("beyond_mocap.passes_clear", text="", icon="X")
+    panel.progress(context, "passes")
+    for line in settings.told.splitlines():
+        paragraph(layout, line, "INFO")
+    if settings.strikes:
+        section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
+    section(layout, "ball_choices", "Choices", lambda opened: choices(opened, settings))
+    section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
+
+
+def strikes(layout, settings) -> None:
+    """Figures, and a line for each strike that goes there."""
+    table(layout, settings.figures.splitlines())
+    column = layout.column(align=True)
+    for frame, text in told_lines(settings.strikes):
+        column.operator("beyond_mocap.go_to_strike", text=f"{frame}  {text}", icon="KEYTYPE_KEYFRAME_VEC").frame = frame
+
+
+def of_player(layout, player) -> None:
+    """Where the picked player stands, and what he strikes with."""
+    column = split(layout)
+    for name in ("place", "body", "part"):
+        column.prop(player, name)
+    if player.part in {"foot", "hand", "tool"} and not player.bone:
+        column.prop(player, "side")
+    if player.part == "tool":
+        for name in ("tool_length", "tool_reach", "tool_radius"):
+            column.prop(player, name)
+    column.prop(player, "bone")
+    column.prop(player, "height")
+
+
+def of_pass(layout, settings, one) -> None:
+    """How the picked pass goes."""
+    column = split(layout)
+    column.prop_search(one, "who", settings, "players")
+    column.prop_search(one, "to", settings, "players")
+    column.row().prop(one, "kind", expand=True)
+    for name in ("bounces", "seconds", "at", "part", "side", "error", "actor"):
+        column.prop(one, name)
+    if one.actor is not None:
+        for name in ("actor_cut", *(("actor_first", "actor_last") if one.actor_cut else ())):
+            column.prop(one, name)
+        return
+    if one.actor_known:
+        column.prop(one, "actor_known", icon="ERROR")
+        return
+    for name in ("clip", *(("first", "last") if one.clip else ())):
+        column.prop(one, name)
+
+
+def choices(layout, settings) -> None:
+    """What holds for all passes."""
+    column = split(layout)
+    for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
+        column.prop(settings, name)
+    if settings.serve_from == "PLAYER":
+        column.prop_search(settings, "serve", settings, "players")
+    if settings.serve_from == "PLACE":
+        column.prop(settings, "serve_at")
+    for name in ("transition", "turns", "watch", "missed", "dropped", "seed", "net"):
+        column.prop(settings, name)
+    if settings.net:
+        for name in ("net_from", "net_to", "net_height"):
+            column.prop(settings, name)
+    section(column, "ball_weights", "Weights", lambda opened: weights(opened, settings))
+
+
+def weights(layout, settings) -> None:
+    """Of eq. 1 and 2."""
+    column = split(layout)
+    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")),
+                         ("Two Poses Compared", ("position", "velocity", "bones"))):
+        column.label(text=title)
+        for name in names:
+            column.prop(settings.weights, name)
+
+
+def of_ball(layout, settings) -> None:
+    """The ball's kind, or numbers of one's own."""
+    column = split(layout)
+    column.prop(settings, "ball")
+    column.prop(settings, "own")
+    if settings.own:
+        for name in ("radius", "restitution", "linear_drag", "drag", "gravity"):
+            column.prop(settings, name)

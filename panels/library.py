@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, paragraph, table
+from .tab import Step, paragraph, part, table
 
 MARKS = ("STRIP_COLOR_04", "STRIP_COLOR_02", "STRIP_COLOR_01", "BLANK1")  # green, orange, red, not measured
 STATES = {"OPEN": "RADIOBUT_OFF", "ACCEPTED": "CHECKMARK", "REFUSED": "X"}
@@ -14,7 +14,6 @@ class BEYOND_MOCAP_UL_clips(bpy.types.UIList):
     """The clips of the library that fit what is looked for: quality, name, words, length, and a button that imports."""
 
     def draw_item(self, _context, layout, _data, clip, _icon, _active_data, _active_property):
-        """One clip."""
         row = layout.row(align=True)
         names = row.split(factor=0.66, align=True)
         names.label(text=clip.name, icon=MARKS[clip.mark])
@@ -29,7 +28,6 @@ class BEYOND_MOCAP_UL_proposals(bpy.types.UIList):
     """What was proposed for a clip: what became of it, the words, how sure they are, and buttons to judge them."""
 
     def draw_item(self, _context, layout, _data, one, _icon, _active_data, _active_property, index=0):
-        """One proposal."""
         row = layout.row(align=True)
         row.active = one.state != "REFUSED"
         names = row.split(factor=0.72, align=True)
@@ -69,20 +67,14 @@ class BEYOND_MOCAP_PT_library(Step, bpy.types.Panel):
             box.operator("beyond_mocap.build_library", text="Build Anew", icon="FILE_REFRESH")
         first, *held = settings.library_holds.splitlines() or ("",)
         if held:
-            header, body = layout.panel("beyond_mocap_library_holds", default_closed=True)
-            header.label(text=first)
-            if body:
+            if body := part(layout, "library_holds", first):
                 table(body, held)
-        header, body = layout.panel("beyond_mocap_library_clips", default_closed=True)
-        header.label(text=f"Clips ({listing.total})" if current and listing.total else "Clips")
-        if body:
+        if body := part(layout, "library_clips", f"Clips ({listing.total})" if current and listing.total else "Clips"):
             draw_clips(body, settings, listing, current)
         if context.object is not None and "beyond_mocap_clip" in context.object:
             draw_opened(layout, context.object, settings)
         self.progress(context, "learning")
-        header, body = layout.panel("beyond_mocap_library_more", default_closed=True)
-        header.label(text="Tools")
-        if body:
+        if body := part(layout, "library_more", "Tools"):
             draw_tools(body, settings)
 
 
@@ -108,9 +100,7 @@ def draw_clips(layout, settings, listing, current) -> None:
     row = layout.row(align=True)
     row.operator("beyond_mocap.import_clip", text="Import", icon="IMPORT").path = clip.path
     row.operator("beyond_mocap.annotate_clip", text="Annotate", icon="GREASEPENCIL").path = clip.path
-    header, body = layout.panel("beyond_mocap_library_assets", default_closed=True)
-    header.label(text="Assets")
-    if body:
+    if body := part(layout, "library_assets", "Assets"):
         draw_assets(body, listing)
 
 

@@ -15,7 +15,6 @@ class BEYOND_MOCAP_UL_match(bpy.types.UIList):
     """Everybody in the match, with team and number; a tick for those who are made and shown."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One player."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         row.label(text="", icon=TEAM_ICONS[item.team])

@@ -1,18 +1,20 @@
-"""Path editing: a motion rides a curve. What rides what, how it follows, what it is worth, how it is looked at."""
+"""Path editing: a motion rides a curve. What rides what, how it follows, its figures, how it is looked at."""
 
 from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import lru_cache
 
 import bpy
 
 from ..scene.core.settings import active_player
 from ..scene.path_editing.settings import meant
-from .figure_lines import lines
 from .tab import Step, figures, paragraph, section, split
 
-OVERLAYS = {
-    "path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
-    "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED",
-}
+OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
+            "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
 CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
 LOOKED = "beyond_mocap_path_camera"  # custom property of our cameras: which one it is
 NUDGES = (
@@ -24,6 +26,21 @@ WORSE = {  # what each frame does
     "tangent": "The whole tangent: a hill tips the body over, and where the path is steep it lies down",
     "absolute": "Offsets are not turned with the path: in a bend the sway of the steps points the wrong way",
 }
+
+FIGURES = (  # name, path in the figures, factor, form, unit; what is aimed for: a number, a path of the recording's
+    # own, or that where it is more than a number
+    ("Way", "metres", 1.0, "{:.1f}", " m", None),
+    ("Time", "seconds", 1.0, "{:.1f}", " s", None),
+    ("Off the path", "root_error_m.mean", 100.0, "{:.2f}", " cm", ("root_error_own_m.mean", 0.005)),
+    ("Speed off", "kept_speed.path.p95", 100.0, "{:.2f}", " %", 0.01),
+    ("Feet slide", "skate.contact_cm_s", 1.0, "{:.1f}", " cm/s", "skate.source_contact_cm_s"),
+    ("Not planted", "skate.before_contact_cm_s", 1.0, "{:.1f}", " cm/s", None),
+    ("Slide a step", "skate.stance_mm_median", 1.0, "{:.1f}", " mm", 5.0),
+    ("Feet moved", "foot_correction_m.p95", 100.0, "{:.1f}", " cm", 0.10),
+    ("Legs short", "ik_miss_share", 100.0, "{:.1f}", " %", 0.0),
+    ("Hardest seam", "seam_jerk.max", 1.0, "{:.2f}", " x", 1.3),
+)
+SLACK = 1.02  # of an aim: what the table's last digit does not show
 
 
 class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
@@ -45,7 +62,7 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
                 section(layout, "path_curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
                 section(layout, "path_following", "How It Follows", lambda opened: following(opened, ride))
                 section(layout, "path_body", "Body", lambda opened: own_body(opened, ride))
-                if told := lines(ride.figures):
+                if told := figure_lines(ride.figures):
                     section(layout, "path_figures", "Figures", lambda opened: figures(opened, told))
         section(layout, "path_cameras", "Cameras & Nudging", lambda opened: looking(opened, context), closed=False)
         section(layout, "path_overlays", "Overlays", lambda opened: overlays(opened, context.scene.beyond_mocap.view))
@@ -141,3 +158,36 @@ def overlays(layout, view) -> None:
     grid.active = view.show
     for name, icon in OVERLAYS.items():
         grid.prop(view, name, icon=icon, toggle=True)
+
+
+@lru_cache(maxsize=64)
+def figure_lines(figures: str) -> str:
+    """The lines of figures as JSON text; "" where there are none. Kept, since panels ask at every redraw."""
+    try:
+        table = json.loads(figures) if figures else {}
+    except ValueError:
+        table = {}
+    found = []
+    for name, path, factor, form, unit, aim in FIGURES:
+        value = _figure(table, path)
+        if value is None:
+            continue
+        most = _most(table, aim)
+        status = "" if most is None else ("met" if value * factor <= most * factor * SLACK + 0.05 else "missed")
+        told = "" if most is None else f"≤ {form.format(factor * most)}"
+        found.append(f"{name}: {form.format(factor * value)}{unit}\t{told}\t{status}")
+    return "\n".join(found)
+
+
+def _most(table: Mapping, aim) -> float | None:
+    """What is aimed for, see FIGURES."""
+    if isinstance(aim, tuple):
+        own = _figure(table, aim[0])
+        return max(own, aim[1]) if own is not None else aim[1]
+    return _figure(table, aim) if isinstance(aim, str) else aim
+
+
+def _figure(table: Mapping, path: str) -> float | None:
+    for part in path.split("."):
+        table = table.get(part) if isinstance(table, Mapping) else None
+    return float(table) if isinstance(table, (int, float)) and math.isfinite(table) else None

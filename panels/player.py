@@ -5,14 +5,13 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import active_player
-from .tab import Step, paragraph
+from .tab import Step, paragraph, part, split
 
 
 class BEYOND_MOCAP_UL_players(bpy.types.UIList):
     """Players with their shirts; a tick for those that the next steps are about."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One player."""
         row = layout.row(align=True)
         row.prop(item, "use", text="")
         row.prop(item, "name", text="", emboss=False)
@@ -36,9 +35,8 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         row.operator("beyond_mocap.draw_track", icon="CURVE_BEZCURVE")
         row.operator("beyond_mocap.track_object", text="From Object", icon="EMPTY_AXIS")
         row = layout.row()
-        row.template_list(
-            "BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player", rows=3
-        )
+        row.template_list("BEYOND_MOCAP_UL_players", "", settings, "players", settings, active_propname="active_player",
+                          rows=3)
         row.column(align=True).operator("beyond_mocap.remove_player", text="", icon="REMOVE")
         if any(player.dot is None for player in settings.players):
             layout.operator("beyond_mocap.place_players", icon="NLA")
@@ -46,8 +44,7 @@ class BEYOND_MOCAP_PT_players(Step, bpy.types.Panel):
         if player is None:
             paragraph(layout, "Import a file with positions, drop it into the view, or draw a track", "INFO")
             return
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+        column = split(layout)
         column.prop(player, "drawn_track")
         if player.drawn_track is not None:
             drawn_on(column, player)
@@ -72,7 +69,6 @@ class BEYOND_MOCAP_UL_pins(bpy.types.UIList):
     """A player's pins: what is held, when and how long."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
-        """One pin."""
         row = layout.row(align=True)
         row.prop(item, "part", text="", emboss=False)
         if item.target is None:
@@ -91,9 +87,7 @@ def drawn_on(column, player) -> None:
 
 def own(layout, player) -> None:
     """What is this player's own: height, foot, style."""
-    header, body = layout.panel("beyond_mocap_player_own", default_closed=True)
-    header.label(text="Player")
-    if body:
+    if body := part(layout, "player_own", "Player"):
         body.use_property_split, body.use_property_decorate = True, False
         for name in ("height", "strong_foot", "style", "style_weight"):
             body.prop(player, name)
@@ -101,9 +95,7 @@ def own(layout, player) -> None:
 
 def pinned(layout, player) -> None:
     """Where hands, feet and gaze have to be."""
-    header, body = layout.panel("beyond_mocap_player_pins", default_closed=True)
-    header.label(text=f"Pins: {len(player.pins)}" if player.pins else "Pins")
-    if body:
+    if body := part(layout, "player_pins", f"Pins: {len(player.pins)}" if player.pins else "Pins"):
         row = body.row()
         row.template_list("BEYOND_MOCAP_UL_pins", "", player, "pins", player, active_propname="active_pin", rows=2)
         row.column(align=True).operator("beyond_mocap.remove_pin", text="", icon="REMOVE")

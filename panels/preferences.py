@@ -1,4 +1,5 @@
-"""The add-on's own page in Blender's preferences: where caches go, threads, keys.
+"""What stands in Blender's own places: the add-on's page in the preferences (where caches go, threads, keys), and
+entries of the menus.
 
 The keys that are drawn are the user's own configuration, found by our operators' names, so that changes are kept by
 Blender.
@@ -10,15 +11,15 @@ import bpy
 import rna_keymap_ui
 
 from ..scene.core.preferences import EXTENSION, Preferences
+from .tab import part
 
 
 def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
     """A row for every key of the extension, under the name of the editor in which it works."""
     configurations = context.window_manager.keyconfigs
     for keymap in _with_our_keys(configurations.addon):
-        own = configurations.user.keymaps.find(
-            keymap.name, space_type=keymap.space_type, region_type=keymap.region_type
-        )
+        own = configurations.user.keymaps.find(keymap.name, space_type=keymap.space_type,
+                                               region_type=keymap.region_type)
         if own is None:
             continue
         column = layout.column()
@@ -27,11 +28,6 @@ def draw_keys(layout: bpy.types.UILayout, context: bpy.types.Context) -> None:
         for item in own.keymap_items:
             if item.idname.startswith("beyond_mocap."):
                 rna_keymap_ui.draw_kmi(["ADDON", "USER", "DEFAULT"], configurations.user, own, item, column, level=0)
-
-
-def _with_our_keys(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:
-    keymaps = configuration.keymaps if configuration is not None else ()
-    return [k for k in keymaps if any(item.idname.startswith("beyond_mocap.") for item in k.keymap_items)]
 
 
 class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
@@ -46,7 +42,43 @@ class BeyondMocapPreferences(Preferences, bpy.types.AddonPreferences):
         column.use_property_split = True
         column.prop(self, "cache_folder", placeholder="Beside each library")
         column.prop(self, "threads", text="Threads (0: all)")
-        header, body = layout.panel("beyond_mocap_keys")
-        header.label(text="Keys")
-        if body:
+        if body := part(layout, "keys", "Keys", closed=False):
             draw_keys(body, context)
+
+
+def draw_import(self, _context):
+    """File > Import."""
+    self.layout.operator("beyond_mocap.import_clips", text="Beyond Mocap Clips (.bvh, .fbx ...)")
+    self.layout.operator("beyond_mocap.import_tracking", text="Beyond Mocap Tracking (.csv ...)")
+    self.layout.operator("beyond_mocap.import_markers", text="Beyond Mocap Optical Markers (.c3d, .trc)")
+
+
+def draw_export(self, _context):
+    """File > Export."""
+    self.layout.operator("beyond_mocap.export_bvh", text="Beyond Mocap Motion (.bvh)")
+    self.layout.operator("beyond_mocap.study_render", text="Beyond Mocap Study Clips (.mp4)")
+
+
+def draw_strip(self, _context):
+    """The context menu of strips in the NLA editor."""
+    self.layout.separator()
+    self.layout.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
+
+
+def register():
+    """Append ours."""
+    bpy.types.NLA_MT_context_menu.append(draw_strip)
+    bpy.types.TOPBAR_MT_file_import.append(draw_import)
+    bpy.types.TOPBAR_MT_file_export.append(draw_export)
+
+
+def unregister():
+    """Take ours away."""
+    bpy.types.NLA_MT_context_menu.remove(draw_strip)
+    bpy.types.TOPBAR_MT_file_import.remove(draw_import)
+    bpy.types.TOPBAR_MT_file_export.remove(draw_export)
+
+
+def _with_our_keys(configuration: bpy.types.KeyConfig | None) -> list[bpy.types.KeyMap]:
+    keymaps = configuration.keymaps if configuration is not None else ()
+    return [k for k in keymaps if any(item.idname.startswith("beyond_mocap.") for item in k.keymap_items)]

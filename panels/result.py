@@ -5,13 +5,11 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import active_player
-from .tab import Step, figures, paragraph, wrapped
+from .tab import Step, figures, paragraph, part, wrapped
 
-STATES = {
-    "NONE": ("Nothing is shown", "BLANK1"),
-    "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
-    "ACCEPTED": ("Accepted", "CHECKMARK"),
-}
+STATES = {"NONE": ("Nothing is shown", "BLANK1"),
+          "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
+          "ACCEPTED": ("Accepted", "CHECKMARK")}
 MENDS = {  # what the button says that brings a player up to date
     "update": ("Update", "FILE_REFRESH"),
     "build_library": ("Build Library", "ASSET_MANAGER"),
@@ -42,9 +40,7 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
         row = layout.row(align=True)
         for name in ("make_bodies", "make_ball", "make_paths"):
             row.prop(settings, name, toggle=True)
-        header, body = layout.panel("beyond_mocap_result_more", default_closed=True)
-        header.label(text="Time & Stage")
-        if body:
+        if body := part(layout, "result_more", "Time & Stage"):
             body.use_property_split, body.use_property_decorate = True, False
             body.prop(settings, "keep_hand_keys")
             body.prop(settings, "start_frame")
@@ -107,28 +103,20 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
         """What the player's settings keep."""
         layout, player = self.layout, active_player(context.scene.beyond_mocap)
         layout.label(text=player.name, icon="ARMATURE_DATA")
-        header, body = layout.panel("beyond_mocap_quality_warnings")
         lines = player.warnings.splitlines()
-        header.label(text=f"Warnings: {len(lines)}" if lines else "No Warnings", icon="ERROR" if lines else "CHECKMARK")
-        if body:
+        title, icon = (f"Warnings: {len(lines)}", "ERROR") if lines else ("No Warnings", "CHECKMARK")
+        if body := part(layout, "quality_warnings", title, closed=False, icon=icon):
             for line in lines:
                 text, _, seconds = line.partition("\t")
                 self.jump(body, player, text, seconds, "ERROR")
-        header, body = layout.panel("beyond_mocap_quality_moments")
-        header.label(text="Key Moments")
-        if body:
+        if body := part(layout, "quality_moments", "Key Moments", closed=False):
             for line in player.moments.splitlines():
                 text, second, status = (*line.split("\t"), "", "")[:3]
-                self.jump(
-                    body, player, text, second, "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC"
-                )
-        header, body = layout.panel("beyond_mocap_quality_why")
-        header.label(text="Why This Clip")
-        if body:
+                self.jump(body, player, text, second,
+                          "KEYTYPE_EXTREME_VEC" if status == "missed" else "KEYTYPE_KEYFRAME_VEC")
+        if body := part(layout, "quality_why", "Why This Clip", closed=False):
             self.why(body, context.window_manager.beyond_mocap_playhead.why)
-        header, body = layout.panel("beyond_mocap_quality_figures")
-        header.label(text="Figures")
-        if body:
+        if body := part(layout, "quality_figures", "Figures", closed=False):
             figures(body, player.quality)
 
     def jump(self, layout, player, text: str, seconds: str, icon: str) -> None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import bpy
 
-from .tab import Step, paragraph
+from .tab import Step, paragraph, part, split
 
 
 class BEYOND_MOCAP_UL_bones(bpy.types.UIList):
     """Parts of the body and the bones that move them."""
 
     def draw_item(self, context, layout, _data, item, _icon, _active_data, _active_property):
-        """One part."""
         row = layout.split(factor=0.42)
         row.label(text=item.name.replace("_", " ").capitalize())
         target = context.scene.beyond_mocap.rig.target
@@ -26,18 +25,15 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
     bl_order = 5
 
     def draw(self, context):
-        """Rig, map, bake, export."""
         layout, rig = self.layout, context.scene.beyond_mocap.rig
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+        column = split(layout)
         row = column.row(align=True)
         row.prop(rig, "target")
         row.operator("beyond_mocap.use_selected_rig", text="", icon="EYEDROPPER")
         column.prop(rig, "source", placeholder="The active player's body")
         if rig.target is not None:
             self.draw_map(layout, rig)
-        column = layout.column()
-        column.use_property_split, column.use_property_decorate = True, False
+        column = split(layout)
         for name in ("root", "steps", "ik", "plants", "reduces"):
             column.prop(rig, name)
         if rig.reduces:
@@ -57,9 +53,7 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
 
     def draw_map(self, layout, rig) -> None:
         """The bone map."""
-        header, body = layout.panel("beyond_mocap_bone_map", default_closed=True)
-        header.label(text="Bone Map")
-        if body:
+        if body := part(layout, "bone_map", "Bone Map"):
             body.template_list("BEYOND_MOCAP_UL_bones", "", rig, "bones", rig, active_propname="active_bone", rows=8)
             row = body.row(align=True)
             row.operator("beyond_mocap.map_bones", text="Map", icon="FILE_REFRESH")
@@ -69,9 +63,7 @@ class BEYOND_MOCAP_PT_rig(Step, bpy.types.Panel):
 
     def draw_export(self, layout, rig) -> None:
         """What goes out, and how."""
-        header, body = layout.panel("beyond_mocap_export", default_closed=False)
-        header.label(text="Export")
-        if body:
+        if body := part(layout, "export", "Export", closed=False):
             body.use_property_split, body.use_property_decorate = True, False
             for name in ("format", "engine", "who", "own_rate", "deform_only", "meshes"):
                 body.prop(rig, name)

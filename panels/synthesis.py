@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 from bl_ui.utils import PresetPanel
 
-from .tab import Step
+from .tab import Step, part
 
 
 class BEYOND_MOCAP_MT_presets(bpy.types.Menu):
@@ -33,11 +33,9 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
     bl_order = 3
 
     def draw_header_preset(self, _context):
-        """The presets."""
         BEYOND_MOCAP_PT_presets.draw_panel_header(self.layout)
 
     def draw(self, context):
-        """Button, progress, choices."""
         layout, settings = self.layout, context.scene.beyond_mocap
         row = layout.row(align=True)
         row.scale_y = 1.3
@@ -45,9 +43,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
         row.operator("beyond_mocap.update", icon="FILE_REFRESH")
         row.prop(settings, "live", text="", icon="UV_SYNC_SELECT")
         self.queue(context)
-        header, body = layout.panel("beyond_mocap_synthesis_more", default_closed=True)
-        header.label(text="Choices")
-        if body:
+        if body := part(layout, "synthesis_more", "Choices"):
             body.use_property_split, body.use_property_decorate = True, False
             body.prop(settings, "method")
             if settings.method == "distance":
@@ -77,8 +73,7 @@ class BEYOND_MOCAP_PT_synthesis(Step, bpy.types.Panel):
 
     def fine_tuning(self, layout, settings):
         """What seldom needs another value, closed at first."""
-        header, body = layout.panel("beyond_mocap_synthesis_tuning", default_closed=True)
-        header.label(text="Fine Tuning")
+        body = part(layout, "synthesis_tuning", "Fine Tuning")
         if not body:
             return
         for name in settings.list_tuning():

@@ -55,11 +55,16 @@ def wrapped(text: str) -> list[str]:
     return textwrap.wrap(text, max(16, int((width - EDGES) / LETTER)))
 
 
-def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
-    """A part that can be folded; name: its own among all panels."""
+def part(layout, name: str, title: str, closed: bool = True, icon: str = "NONE"):
+    """A part that can be folded, to draw into; None while it is closed. name: its own among all panels."""
     header, body = layout.panel(f"beyond_mocap_{name}", default_closed=closed)
-    header.label(text=title)
-    if body:
+    header.label(text=title, icon=icon)
+    return body
+
+
+def section(layout, name: str, title: str, draw, closed: bool = True) -> None:
+    """A part that can be folded, drawn by `draw` while it is open."""
+    if body := part(layout, name, title, closed):
         draw(body)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from ..scene.core.settings import active_player
-from .tab import paragraph
+from .tab import paragraph, part
 
 MOST = 60  # key moments that the list shows
 
@@ -75,9 +75,7 @@ class Timeline:
         column.operator("beyond_mocap.add_span", icon="ADD")
         column.operator("beyond_mocap.split_span", icon="UNLINKED")
         column.operator("beyond_mocap.join_spans", icon="LINKED")
-        header, body = layout.panel("beyond_mocap_timeline_text", default_closed=True)
-        header.label(text="Text Form")
-        if body:
+        if body := part(layout, "timeline_text", "Text Form"):
             column = body.column(align=True)
             column.operator("beyond_mocap.read_words", icon="IMPORT")
             column.operator("beyond_mocap.words_to_text", icon="TEXT")

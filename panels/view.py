@@ -7,11 +7,9 @@ import bpy
 from ..scene.core.settings import active_player
 from .tab import Step
 
-ICONS = {
-    "track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
-    "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
-    "shots": "CON_TRACKTO",
-}
+ICONS = {"track": "CURVE_PATH", "footprints": "MOD_DYNAMICPAINT", "contacts": "PIVOT_CURSOR", "seams": "SEQUENCE",
+         "moments": "KEYTYPE_KEYFRAME_VEC", "speed": "DRIVER_DISTANCE", "ghosts": "GHOST_ENABLED",
+         "shots": "CON_TRACKTO"}
 
 
 class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
@@ -22,11 +20,9 @@ class BEYOND_MOCAP_PT_view(Step, bpy.types.Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw_header(self, context):
-        """One switch for all."""
         self.layout.prop(context.scene.beyond_mocap.view, "show", text="")
 
     def draw(self, context):
-        """Switches, choices, buttons."""
         layout, settings = self.layout, context.scene.beyond_mocap
         view = settings.view
         layout.row().prop(view, "players", expand=True)

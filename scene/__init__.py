@@ -11,9 +11,14 @@ from .match import child
 
 
 def register():
-    """Register the data classes, attach them to Blender's own data, and begin to watch."""
+    """Register the data classes, attach them to Blender's own data, and begin to watch; where that fails, undo it and
+    pass the error on."""
     registration.register_package(__name__)
-    start_watching()
+    try:
+        start_watching()
+    except BaseException:
+        unregister()
+        raise
 
 
 def unregister():

@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels, linked
+from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 
 GROUND = "Ball Ground"
@@ -53,7 +53,7 @@ def hand_over(
 
 def take_back(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
     """The ball goes its keyed way again; what the handover made goes, unless another ball lies on it."""
-    linked.refuse(ball)
+    channels.check_local(ball)
     _refuse_hidden(ball)
     aim = ball.beyond_mocap_aim
     kept = json.loads(aim.handed_before or "{}")
@@ -114,7 +114,7 @@ def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
 
 
 def _check(ball: bpy.types.Object, frame: int) -> None:
-    linked.refuse(ball)
+    channels.check_local(ball)
     channels.check_free(ball)
     if ball.type != "MESH":
         raise InputError(f"object {ball.name}", f"of type {ball.type.lower()}", "a mesh", "select the ball")
@@ -133,7 +133,7 @@ def _check(ball: bpy.types.Object, frame: int) -> None:
         raise InputError(f"ball {ball.name}", found, expected, "choose another frame")
     if any(("location", axis) not in channels.curves(action, slot) for axis in range(3)):
         raise InputError(f"ball {ball.name}", "no keys of all three of its coordinates", "them", "key its location")
-    linked.refuse(action)
+    channels.check_local(action)
 
 
 def _refuse_hidden(ball: bpy.types.Object) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..core import channels, linked
+from ..core import channels
 from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
@@ -368,7 +368,7 @@ def lines(solved: Solved) -> list[str]:
 
 def leave(ball: bpy.types.Object) -> None:
     """The ball is not aimed any more, and plays what it did before; its curve goes, the target stays."""
-    linked.refuse(ball)
+    channels.check_local(ball)
     channels.check_free(ball)
     aim = ball.beyond_mocap_aim
     path = aim.curve

@@ -15,7 +15,7 @@ from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, at_frames
 from ..rigs import armature
-from . import channels, linked
+from . import channels
 from .measure import frames_per_second, whole_frames
 
 PLACED = "beyond_mocap_placement"
@@ -23,10 +23,8 @@ PLACED = "beyond_mocap_placement"
 what is drawn beside the body follows it when it is moved."""
 
 
-def write(
-    body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
-    name: str | None = None, generated: bool = False,
-) -> bpy.types.Action:
+def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None,
+          name: str | None = None, generated: bool = False) -> bpy.types.Action:
     """Play `motion` on the armature `body`: a new action `name` with a key on every whole scene frame.
 
     start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
@@ -43,12 +41,11 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
 
     InputError where the armature cannot play it.
     """
-    linked.refuse(body)
+    channels.check_local(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
-        raise InputError(
-            f"armature {body.name}", "its motion rides a path", "an armature that does not", "press Keep or Leave first"
-        )
+        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not",
+                         "press Keep or Leave first")
     missing = [joint for joint in motion.skeleton.names if joint not in body.data.bones]
     if missing:
         raise InputError(f"armature {body.name}", f"no bone {', '.join(missing[:3])}", "a bone for every joint")
@@ -70,9 +67,7 @@ def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
     return frames, curves
 
 
-def read(
-    body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None
-) -> Motion:
+def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Action | None = None, slot=None) -> Motion:
     """The motion that an action plays on the armature `body`, at the scene's frame rate, from first key to last.
 
     action and slot: those that the armature plays if None. Curves of any rotation mode are read; what has no curve
@@ -113,10 +108,8 @@ def _path(bone: str, name: str) -> str:
 def _values(bone: bpy.types.PoseBone, name: str, curves: dict, frames: np.ndarray) -> np.ndarray:
     """A pose bone's property over frames: (F, n)."""
     path, now = _path(bone.name, name), getattr(bone, name)
-    columns = [
-        channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
-        for i, value in enumerate(now)
-    ]
+    columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value) for i,
+               value in enumerate(now)]
     return np.stack(columns, axis=1)
 
 

@@ -21,10 +21,8 @@ FIGURES = {  # what else a key has, and how foreach_get gives it
 }
 
 
-def animate(
-    target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
-    generated: bool = False,
-):
+def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: dict[str, tuple[str, np.ndarray]],
+            generated: bool = False):
     """Give `target` a new action `name` and return it.
 
     frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for
@@ -213,10 +211,6 @@ def joined(parts: list, name: str, slot_name: str):
     return built(name, slot_name, tables, models)
 
 
-def _appended(before: dict | None, after: dict) -> dict:
-    return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
-
-
 def keyed_range(found: dict) -> tuple[int, int] | None:
     """First and last whole frame between the outermost keys of curves from `curves`; None where there is no key."""
     ends = [curve.range() for curve in found.values() if len(curve.keyframe_points)]
@@ -236,6 +230,19 @@ def sample(curve: bpy.types.FCurve, frames: np.ndarray) -> np.ndarray:
         if np.all(np.abs(times[at] - frames) < 1e-3):
             return values[at].astype(float)
     return np.array([curve.evaluate(frame) for frame in frames])
+
+
+def check_local(*things: bpy.types.ID | None) -> None:
+    """InputError where one of these is linked from another file: what is written to it is lost with the next load."""
+    for thing in things:
+        if thing is not None and thing.library is not None:
+            found = f"linked from {thing.library.filepath}"
+            step = "use Object > Library Override > Make, or Object > Relations > Make Local"
+            raise InputError(thing.name, found, "one of this file", step)
+
+
+def _appended(before: dict | None, after: dict) -> dict:
+    return after if before is None else {name: np.concatenate([before[name], after[name]]) for name in after}
 
 
 def _channelbag(action, slot):

@@ -2,7 +2,8 @@
 
 A feature makes one `Watcher` at the top of its module: what it watches, and what it does then. Blender calls one
 handler for each kind of event, and one timer for each watcher that looks for itself. What raises is reported once, and
-everything else, and the next look too, goes on. `unregister` takes all of it away.
+everything else, and the next look too, goes on; the panel says so until the same succeeds. `unregister` takes all of it
+away.
 
 Without a window Blender calls no timer, and what scripts edit is not watched: they ask for what they want. Undo, redo
 and files are followed there too.
@@ -89,14 +90,14 @@ class Watcher:
         """Take in an event: `what` is one of the values of EVENTS."""
         action = getattr(self, what)
         if action is not None:
-            guard(self.name, lambda: action(*arguments))
+            guard(self.name, lambda: action(*arguments), counts=not (self.look or self.follow or self.settle))
         if what in ANOTHER_STATE:
             self.mark()
 
     def tick(self) -> float:
         """One look by the timer; seconds until the next."""
         act = self.look or (self._follow if self.follow else self._settle)
-        return guard(self.name, act, IDLE)
+        return guard(self.name, act, IDLE, counts=bool(self.look))  # the others count where there was something to do
 
     def _mark_what_matters(self, _scene, depsgraph) -> None:
         if any(isinstance(update.id, self.matters) for update in depsgraph.updates):
@@ -111,6 +112,7 @@ class Watcher:
                 scenes.add(shown.scene.session_uid)
                 with bpy.context.temp_override(window=shown):
                     self.follow(shown.scene)
+        _take_back(f"{self.name} has failed")
         return max(BUSY_TICK, SHARE * (perf_counter() - begun))
 
     def _settle(self) -> float:
@@ -124,6 +126,7 @@ class Watcher:
             self.dirty = False
             with bpy.context.temp_override(window=shown):
                 again = self.settle(shown.scene)  # which may mark it meanwhile
+            _take_back(f"{self.name} has failed")
             self.dirty = self.dirty or bool(again)
         return TICK
 
@@ -144,25 +147,31 @@ def is_playing() -> bool:
     return any(shown.screen.is_animation_playing for shown in bpy.context.window_manager.windows)
 
 
-def guard(name: str, action: Callable[[], Any], otherwise: Any = None) -> Any:
-    """What `action` returns; `otherwise` where it raises, which is reported once under this name."""
+def guard(name: str, action: Callable[[], Any], otherwise: Any = None, counts: bool = True) -> Any:
+    """What `action` returns; `otherwise` where it raises, which is reported once under this name. counts: whether the
+    panel stops saying so where it does not raise."""
     try:
-        return action()
+        result = action()
     except Exception as error:  # a timer that raises is never called again
         _report(f"{name} has failed", error)
         return otherwise
+    if counts:
+        _take_back(f"{name} has failed")
+    return result
 
 
 def attempt(action: Callable[[], Any], tell: Callable[[str], Any], failed: str) -> Any:
     """What `action` returns. Where it raises, `tell` is called with the reason, or with `failed` where that is no
     BeyondMocapError, which is reported too; then what `tell` returns."""
     try:
-        return action()
+        result = action()
     except BeyondMocapError as error:
         return tell(str(error))
     except Exception as error:  # one that fails must not keep the others from being looked at
         _report(failed, error)
-        return tell(f"{failed}; see the system console")
+        return tell(_message(failed))
+    _take_back(failed)
+    return result
 
 
 def soon(action: Callable[[], float | None], seconds: float) -> None:
@@ -179,11 +188,6 @@ def soon(action: Callable[[], float | None], seconds: float) -> None:
     if not bpy.app.background and action not in _timers:
         _timers[action] = call
         bpy.app.timers.register(call, first_interval=seconds, persistent=True)
-
-
-def is_waiting(action: Callable) -> bool:
-    """Whether `soon` is to call it."""
-    return action in _timers
 
 
 def start_watching() -> None:
@@ -211,7 +215,7 @@ def stop_watching() -> None:
             bpy.app.timers.unregister(call)
     for watcher in reversed(_watchers):
         if watcher.ends:
-            guard(watcher.name, watcher.ends)
+            guard(watcher.name, watcher.ends, counts=False)
         watcher.dirty = True
     window.clear()
     _reported.clear()
@@ -233,4 +237,16 @@ def _report(failed: str, error: Exception) -> None:
     if seen not in _reported:
         _reported.add(seen)
         traceback.print_exception(error)
-    bpy.context.window_manager.beyond_mocap_work.trouble = f"{failed}; see the system console"
+    bpy.context.window_manager.beyond_mocap_work.trouble = _message(failed)
+
+
+def _take_back(failed: str) -> None:
+    """The panel says no more that something `failed`, since it has succeeded."""
+    work = bpy.context.window_manager.beyond_mocap_work
+    if work.trouble == _message(failed):
+        work.trouble = ""
+        window.redraw()
+
+
+def _message(failed: str) -> str:
+    return f"{failed}; see the system console"

@@ -67,11 +67,9 @@ class Box:
 
 def content(state: State, who: str, told: str = "", folded: bool = False) -> Content:
     """What the menu says in a state. told: what was done last; folded: no list before a first word is chosen."""
-    rows = tuple(
-        Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
-            word=option.word, faint=not option.served, chosen=option.chosen)
-        for option in state.shown
-    )
+    rows = tuple(Row(str(option.digit), option.word, f"{_ARROW} {' '.join(option.instead)}" if option.instead else "",
+                     word=option.word, faint=not option.served, chosen=option.chosen)
+                 for option in state.shown)
     more = [f"= more ({state.page + 1}/{state.pages})"] if state.pages > 1 else []
     if not state.trail:
         begun = [f"in {state.start:.2f} s, O: out"] if state.start is not None else ["I in  O out"]
@@ -89,9 +87,8 @@ def content(state: State, who: str, told: str = "", folded: bool = False) -> Con
     return Content(head, rows, tuple(hints))
 
 
-def laid_out(
-    content: Content, at: tuple[float, float] | None, free: Rect, size: float, width_of: Callable[[str], float]
-) -> Box:
+def laid_out(content: Content, at: tuple[float, float] | None, free: Rect, size: float,
+             width_of: Callable[[str], float]) -> Box:
     """The menu with its upper left corner by the pointer `at` (None: in the lower left corner of `free`), moved to lie
     within `free`. size: of the letters; width_of: pixels that a text takes."""
     row, edge, gap = round(_ROW * size), round(_EDGE * size), round(_GAP * size)

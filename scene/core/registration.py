@@ -16,10 +16,8 @@ from typing import get_type_hints
 
 import bpy
 
-KINDS = (
-    bpy.types.PropertyGroup, bpy.types.Operator, bpy.types.FileHandler, bpy.types.UIList, bpy.types.Menu,
-    bpy.types.Panel, bpy.types.Header, bpy.types.AddonPreferences,
-)
+KINDS = (bpy.types.PropertyGroup, bpy.types.Operator, bpy.types.FileHandler, bpy.types.UIList, bpy.types.Menu,
+         bpy.types.Panel, bpy.types.Header, bpy.types.AddonPreferences)
 _undoing: dict[str, list[Callable[[], None]]] = {}
 
 

@@ -1,8 +1,10 @@
-"""What an object plays, put aside and brought back exactly: action, slot, NLA, and how it stands."""
+"""Put aside and brought back exactly: what an object plays (action, slot, NLA, how it stands), and the user's scene for
+work that needs Blender's importers, exporters or modes."""
 
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager, nullcontext
 
 import bpy
 
@@ -88,10 +90,6 @@ def stance_of(target: bpy.types.Object) -> dict:
     return {"": _stands(target), **{f"{bone.name}": _stands(bone) for bone in bones}}
 
 
-def _stands(thing) -> list:
-    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
-
-
 def stand(target: bpy.types.Object, stance: dict) -> None:
     """Let object and bones stand as `stance_of` said."""
     for name, (mode, *values) in stance.items():
@@ -101,3 +99,40 @@ def stand(target: bpy.types.Object, stance: dict) -> None:
         thing.rotation_mode = mode
         for place, value in zip(STANDS, values, strict=True):
             setattr(thing, place, value)
+
+
+@contextmanager
+def scene_aside(name: str):
+    """A new scene, in the window where there is one, else in the context; all data that comes in meanwhile is removed
+    at the end, and the scene and view layer from before are shown again."""
+    before, window = set(_all_data()), bpy.context.window
+    home, layer = (window.scene, window.view_layer.name) if window is not None else (None, "")
+    scene = bpy.data.scenes.new(name)
+    try:
+        if window is not None:
+            window.scene = scene
+        with nullcontext() if window is not None else bpy.context.temp_override(
+                scene=scene, view_layer=scene.view_layers[0]):
+            yield scene
+    finally:
+        if window is not None:
+            window.scene = home
+            window.view_layer = home.view_layers[layer]
+        came = [item for key, item in _all_data().items() if key not in before]
+        bpy.data.batch_remove([item for item in came if not isinstance(item, bpy.types.Scene)])
+        for item in [item for item in came if isinstance(item, bpy.types.Scene)]:
+            bpy.data.scenes.remove(item)
+
+
+def _stands(thing) -> list:
+    return [thing.rotation_mode, *(list(getattr(thing, name)) for name in STANDS)]
+
+
+def _all_data() -> dict:
+    """All that the file holds, by identity: newer Blenders list the same things under several names."""
+    found = {}
+    for name in dir(bpy.data):
+        kind = getattr(bpy.data, name)
+        if isinstance(kind, bpy.types.bpy_prop_collection) and name not in {"window_managers", "screens", "workspaces"}:
+            found.update({item.session_uid: item for item in kind if hasattr(item, "session_uid")})
+    return found

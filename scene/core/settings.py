@@ -7,15 +7,7 @@ Paths may be relative to the file. What is too large for a file's properties (a 
 from __future__ import annotations
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ...beyond_mocap.base.settings import rows_of
 from ..overlays.settings import BeyondMocapView
@@ -24,6 +16,8 @@ from ..result.result import BeyondMocapResult, BeyondMocapShared
 from ..rigs.rig import BeyondMocapRig
 from ..timeline.video import BeyondMocapVideo, renew
 from .properties import active_row, with_settings
+
+FILE = {"subtype": "FILE_PATH", "options": {"PATH_SUPPORTS_BLEND_RELATIVE"}}
 
 
 def is_armature(_settings, candidate: bpy.types.Object) -> bool:
@@ -49,17 +43,11 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
 
     name: StringProperty(name="Name", update=show_on_dot, description="What this player is called")
     use: BoolProperty(name="Use", default=True, description="Include this player in Synthesize and Accept")
-    tracking_file: StringProperty(
-        name="Tracking", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="The file with this player's positions",
-    )
-    metadata_file: StringProperty(
-        name="Metadata", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
-        description="The provider's second file, where there is one (pitch, teams)",
-    )
-    feed_id: StringProperty(
-        name="ID in the feed", description="Which player of the tracking file this is; empty for a file of one player"
-    )
+    tracking_file: StringProperty(name="Tracking", description="The file with this player's positions", **FILE)
+    metadata_file: StringProperty(name="Metadata", **FILE,
+                                  description="The provider's second file, where there is one (pitch, teams)")
+    feed_id: StringProperty(name="ID in the feed",
+                            description="Which player of the tracking file this is; empty for a file of one player")
     provider: StringProperty(name="Provider", description="Whose form the tracking file has; empty guesses it")
     drawn_track: PointerProperty(
         name="Drawn Track", type=bpy.types.Object, poll=is_track,
@@ -68,25 +56,18 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     pins: CollectionProperty(type=BeyondMocapPin, description="Where hands, feet and gaze have to be, and when")
     active_pin: IntProperty(name="Pin", min=0, description="The pin that is shown below the list")
     annotation_file: StringProperty(
-        name="Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        name="Words", **FILE,
         description="Text file of lines 'START END words' and 'TIME words'; none means automatic locomotion",
     )
-    annotation_text: PointerProperty(
-        name="Text", type=bpy.types.Text,
-        description="A text of this file with the words; it counts more than the file on disk",
-    )
-    shirt: FloatVectorProperty(
-        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-        description="Colour of the player's shirt", update=show_on_dot,
-    )
-    dot: PointerProperty(
-        name="Dot", type=bpy.types.Object,
-        description="The Empty that runs along the track and carries the strips of the player's words",
-    )
-    body: PointerProperty(
-        name="Body", type=bpy.types.Object, poll=is_armature,
-        description="The armature that this player's takes are shown on; made where it is missing",
-    )
+    annotation_text: PointerProperty(name="Text", type=bpy.types.Text,
+                                     description="A text of this file with the words; it counts more than the file "
+                                     "on disk")
+    shirt: bpy.props.FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, update=show_on_dot,
+                                         default=(0.75, 0.05, 0.06), description="Colour of the player's shirt")
+    dot: PointerProperty(name="Dot", type=bpy.types.Object,
+                         description="The Empty that runs along the track and carries the strips of the player's words")
+    body: PointerProperty(name="Body", type=bpy.types.Object, poll=is_armature,
+                          description="The armature that this player's takes are shown on; made where it is missing")
     rig: PointerProperty(
         name="Rig", type=bpy.types.Object, poll=is_armature,
         description="This player's own rig for Bake to Rig with all players; a copy of the chosen rig where it is "
@@ -94,12 +75,10 @@ class BeyondMocapPlayer(bpy.types.PropertyGroup):
     )
     take: StringProperty(name="Take", options={"HIDDEN"}, description="Name of the newest take in this session")
     quality: StringProperty(name="Quality", options={"HIDDEN"}, description="Lines 'name: value' about the newest take")
-    moments: StringProperty(
-        name="Key moments", options={"HIDDEN"}, description="A line for each key moment of the newest take"
-    )
-    warnings: StringProperty(
-        name="Warnings", options={"HIDDEN"}, description="Lines about what to look at in the newest take"
-    )
+    moments: StringProperty(name="Key moments", options={"HIDDEN"},
+                            description="A line for each key moment of the newest take")
+    warnings: StringProperty(name="Warnings", options={"HIDDEN"},
+                             description="Lines about what to look at in the newest take")
     result: PointerProperty(type=BeyondMocapResult, description="What became of the newest take")
 
 
@@ -109,18 +88,15 @@ class BeyondMocapSettings(bpy.types.PropertyGroup):
     """All steps of one scene."""
 
     attached_to = ("Scene.beyond_mocap",)
-
-    version: IntProperty(
-        name="Version", options={"HIDDEN"},
-        description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet",
-    )
+    version: IntProperty(name="Version", options={"HIDDEN"},
+                         description="Form of what is kept here, see scene/core/migrate.py; 0: not saved yet")
     rig: PointerProperty(type=BeyondMocapRig, description="Rig, bone map, baking and export")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
         description="Folder of BVH clips with their annotations; may be relative to this file",
     )
     words_model: StringProperty(
-        name="Learned Words", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+        name="Learned Words", **FILE,
         description="What Learn from Words has kept, of this library or another; empty: Propose Words goes by rules",
     )
     library_holds: StringProperty(name="Holds", options={"HIDDEN"}, description="What the library built last holds")
@@ -139,7 +115,6 @@ class BeyondMocapWork(bpy.types.PropertyGroup):
     """What runs in the background just now; on the window manager, so that undo leaves it alone."""
 
     attached_to = ("WindowManager.beyond_mocap_work",)
-
     kind: StringProperty(description="Name of the running step; empty while nothing runs")
     text: StringProperty(description="What it is doing")
     fraction: FloatProperty(min=0.0, max=1.0, description="How far it is")

@@ -77,9 +77,8 @@ def catalog_id(catalog: str) -> str:
     return str(uuid.uuid5(_SPACE, catalog))
 
 
-def make(
-    context: bpy.types.Context, drafts: list[Draft], pictures: list, apart: bool = False
-) -> list[bpy.types.Action]:
+def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
+         apart: bool = False) -> list[bpy.types.Action]:
     """The drafts as assets: their own actions marked, or new ones made; returns the actions. apart: own actions are
     left as they are, and copies of them marked."""
     made, rigs = [], []
@@ -123,9 +122,8 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     """Add catalogs to the definitions that hold for files in `folder`: the nearest above it, else its own, written
     beside and renamed; returns that file. InputError where it cannot be written."""
     folder = Path(folder)
-    target = next(
-        (place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()), folder / CATALOGS
-    )
+    target = next((place / CATALOGS for place in (folder, *folder.parents) if (place / CATALOGS).is_file()),
+                  folder / CATALOGS)
     try:
         text = target.read_text("utf-8") if target.is_file() else _HEAD
     except (OSError, UnicodeDecodeError) as error:

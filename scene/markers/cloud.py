@@ -14,7 +14,7 @@ import numpy as np
 from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import linked
+from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
 from . import lines, nodes
@@ -55,7 +55,7 @@ def create(
 def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
     """Let a cloud play other trajectories, or the same ones mended, as fast as it did; what is known of a label stays
     by name."""
-    linked.refuse(cloud, cloud.data)
+    channels.check_local(cloud, cloud.data)
     check(trial)
     if cloud.data.is_editmode:
         bpy.ops.object.mode_set(mode="OBJECT")

@@ -11,7 +11,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import action, channels, linked
+from ..core import action, channels
 from ..core.measure import frames_per_second
 from ..core.properties import property_values
 from ..core.settings import absolute
@@ -47,7 +47,7 @@ class Order:
 
 def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     """What is asked of a cloud by its own settings and the scene's. InputError where something is missing."""
-    linked.refuse(cloud, cloud.data)
+    channels.check_local(cloud, cloud.data)
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     trial = clouds.read(cloud, scene)
     clouds.played_rate(cloud, scene)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from ..core import channels, linked
+from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..stage import ball as balls
 from . import cloud as clouds
@@ -30,7 +30,7 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> tuple[str, "Mar
     InputError where its body has not been reconstructed in this session."""
     from ...beyond_mocap.markers.release.release import ReleaseSettings
 
-    linked.refuse(cloud, cloud.data)
+    channels.check_local(cloud, cloud.data)
     clouds.played_rate(cloud, scene)
     kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
     made = store.made(kept.made)

@@ -39,11 +39,9 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
         if cancelled():
             raise Cancelled("cancelled")
         time.sleep(LOOK)
-    process = subprocess.Popen(
-        [sys.executable, "-m", "beyond_mocap", *arguments, "--json"],
-        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8",
-        errors="replace", env=_surroundings(), **_own_group(),
-    )
+    process = subprocess.Popen([sys.executable, "-m", "beyond_mocap", *arguments, "--json"], stdin=subprocess.DEVNULL,
+                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, encoding="utf-8",
+                               errors="replace", env=_surroundings(), **_own_group())
     _running.add(process)
     try:
         notes, last, asked = _heard(process, progress, cancelled)

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.material import colour, made
 from ..stage.body import LOOKS
 from . import ours
-from .people import TEAMS, Person
+from .load import TEAMS, Person
 
 USUAL = {"home": "#C8102E", "away": "#1D4ED8", "referee": "#15171A"}
 """Shirts of teams whose feed tells no colour."""

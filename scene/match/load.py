@@ -1,4 +1,5 @@
-"""A folder of a made match as what the scene shows of a stretch of it; in any thread, never touching bpy."""
+"""A folder of a made match as what the scene shows of a stretch of it, as plain values and arrays; in any thread, never
+touching bpy."""
 
 from __future__ import annotations
 
@@ -10,13 +11,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...beyond_mocap.base.errors import Cancelled, InputError, told_time
-from .people import TEAMS, Person, Scenery
+from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.motion.track.ball_path import BallPath
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
-    from ...beyond_mocap.motion.track.ball_path import BallPath
 
 LIBRARYS_SHARE = 0.1  # of the bar
+TEAMS = ("home", "away", "referee")
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """A player or referee. id: as the feed has it. number: of the shirt, -1 where there is none. team: one of TEAMS.
+    motions: (s on the match's clock, motion) for every stretch in which he is there, in order."""
+
+    id: str
+    name: str
+    number: int
+    team: str
+    keeper: bool
+    motions: tuple[tuple[float, Motion], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scenery:
+    """A stretch of a match: start and end, s on its clock; length and width of the pitch, m; colours: team -> "#RRGGBB"
+    of the shirts; who is there; the ball, where it is known."""
+
+    start: float
+    end: float
+    length: float
+    width: float
+    colours: dict[str, str]
+    people: tuple[Person, ...]
+    ball: BallPath | None
 
 
 @dataclass(frozen=True)
@@ -34,9 +63,8 @@ class Wanted:
     build: dict = field(default_factory=dict)
 
 
-def scenery(
-    wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None], cancelled: Callable[[], bool]
-) -> tuple["Library", Scenery, tuple[str, ...]]:
+def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float, str], None],
+            cancelled: Callable[[], bool]) -> tuple["Library", Scenery, tuple[str, ...]]:
     """The library (built where it is None), everybody's motion, and lines about whoever cannot be shown.
 
     InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
@@ -46,16 +74,13 @@ def scenery(
 
     state = _state(wanted.folder)
     if library is None:
-        library = build(
-            wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled,
-            progress=lambda done, text: progress(LIBRARYS_SHARE * done, text),
-        )
+        library = build(wanted.library, unit=wanted.unit, **wanted.build, cancelled=cancelled, progress=lambda done,
+                        text: progress(LIBRARYS_SHARE * done, text))
     start, end = _span(wanted, state)
     course = Path(wanted.folder) / "ball.csv"
     ball = read_ball(course) if course.is_file() else None
-    people, lines = _people(
-        wanted, state, library, ball=ball, span=(start, end), progress=progress, cancelled=cancelled,
-    )
+    people, lines = _people(wanted, state, library, ball=ball, span=(start, end), progress=progress,
+                            cancelled=cancelled)
     if not people:
         found = f"nobody is there from {told_time(start)} to {told_time(end)} s"
         raise InputError(wanted.folder, found, "a time of play", *lines[:1])

@@ -1,18 +1,26 @@
-"""The settings of a match as what its two steps need: the command line that makes it, and what is shown of it."""
+"""The settings of a match as what its steps need: what is read, the command line that makes it, what is shown of it."""
 
 from __future__ import annotations
 
+import math
 import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import bpy
 
 from ...beyond_mocap.base.digest import hex_digest
 from ...beyond_mocap.base.errors import InputError
 from ..core import preferences
-from ..core.settings import absolute
-from .load import Wanted
-from .settings import AUTO, BeyondMocapMatch, colours_of, typed
+from ..core.settings import absolute, as_setting
+from ..player import tracks
+from .kits import USUAL, linear
+from .load import TEAMS, Wanted
+from .settings import AUTO, FIRST, BeyondMocapMatch, colours_of, typed
+
+if TYPE_CHECKING:
+    from ...beyond_mocap.motion.track.match_data import Match
 
 
 def command(scene: bpy.types.Scene) -> list[str]:
@@ -27,29 +35,6 @@ def command(scene: bpy.types.Scene) -> list[str]:
     return out + (["--cache", cache] if cache else [])
 
 
-def _asked(scene: bpy.types.Scene) -> list[str]:
-    """The arguments that decide what comes out."""
-    settings, match = scene.beyond_mocap, scene.beyond_mocap_match
-    if not match.tracking_file:
-        raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
-    out = ["--tracking", absolute(match.tracking_file), "--library", _library(settings)]
-    for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
-        out += [option, absolute(path)] if path else []
-    out += ["--provider", match.provider] if match.provider != AUTO else []
-    if match.events_file:
-        out += ["--events-meta", absolute(match.events_metadata_file)] if match.events_metadata_file else []
-        out += ["--events-provider", match.events_provider] if match.events_provider != AUTO else []
-    if 0.0 < match.end <= match.start:
-        found = f"To ({typed(match.end)} s) is not after From ({typed(match.start)} s)"
-        raise InputError("match", found, "a later time",
-                         "set To, or set it to 0 for the match's end")
-    out += ["--from", typed(match.start)] + (["--to", typed(match.end)] if match.end else [])
-    out += _players(match)
-    out += [] if match.solve_touches else ["--no-solve-touches"]
-    out += ["--fps", typed(settings.rate), "--seed", str(settings.seed)]
-    return out + (["--unit", typed(settings.library_unit)] if settings.library_unit else [])
-
-
 def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
     """What is to be shown of a match's folder."""
     settings, match = scene.beyond_mocap, scene.beyond_mocap_match
@@ -58,9 +43,8 @@ def wanted(scene: bpy.types.Scene, folder: str) -> Wanted:
     ticked = ticked if len(ticked) < len(match.players) else ()
     start, end = float(typed(match.start)), float(typed(match.end))
     unit, build = settings.library_unit or None, preferences.for_build(library)
-    return Wanted(
-        folder, start, end, players=ticked, colours=colours_of(match), library=library, unit=unit, build=build,
-    )
+    return Wanted(folder, start, end, players=ticked, colours=colours_of(match), library=library, unit=unit,
+                  build=build)
 
 
 def folder_to_make(scene: bpy.types.Scene) -> str:
@@ -84,6 +68,81 @@ def folder_to_show(scene: bpy.types.Scene) -> str:
     if not found:
         raise InputError("match", "no folder", "the folder of a made match", "press Make Match, or choose one")
     return absolute(found)
+
+
+@dataclass(frozen=True)
+class Read:
+    """What is to be read: absolute paths, "" where there is none; provider "" where it is to be guessed."""
+
+    tracking: str
+    metadata: str
+    provider: str
+
+
+def reading_order(match: BeyondMocapMatch, chosen: str = "") -> Read:
+    """What the settings ask for; chosen: a tracking file that takes the place of theirs. InputError where there is
+    none."""
+    tracking = chosen or absolute(match.tracking_file)
+    if not tracking:
+        raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
+    if tracks.is_plain(tracking):
+        raise InputError(tracking, "one player's track", "a provider's tracking of a match",
+                         "import it in step 2, Track & Words")
+    metadata = "" if chosen else absolute(match.metadata_file)
+    return Read(tracking, metadata, "" if match.provider == AUTO else match.provider)
+
+
+def read_match(order: Read, progress) -> tuple[Read, "Match"]:
+    """Reads it, in any thread."""
+    progress(0.05, "reading the match")
+    return order, tracks.match_of(order.tracking, order.metadata, order.provider)
+
+
+def fill_match(match: BeyondMocapMatch, order: Read, read: "Match") -> None:
+    """The list, the colours and the lines about the data. Who was left out before in the same file stays left out; of
+    another file the first minute is chosen, and what was chosen beside the file before is forgotten."""
+    same = absolute(match.read_of) == order.tracking
+    left_out = {player.feed_id for player in match.players if not player.use} if same else set()
+    if not same:
+        match.tracking_file = as_setting(order.tracking)
+        match.metadata_file = as_setting(order.metadata) if order.metadata else ""
+        if match.read_of:
+            match.events_file = match.events_metadata_file = match.folder = match.made = ""
+        match.start = math.floor(float(read.times[0]))
+        match.end = min(match.start + FIRST, math.floor(10.0 * float(read.times[-1])) / 10.0)
+        match.active = 0
+    match.read_of, match.length_s = as_setting(order.tracking), float(read.times[-1])
+    match.players.clear()
+    for player in sorted(read.players, key=lambda one: (TEAMS.index(one.team), one.number)):
+        row = match.players.add()
+        row.name, row.feed_id, row.number, row.team = player.name, player.id, player.number, player.team
+        row.position, row.use = player.position, player.id not in left_out
+    for team in read.teams if not same else ():
+        setattr(match, f"{team.ground}_colour", linear(team.colour or USUAL[team.ground]))
+    match.report = "\n".join(dict.fromkeys((*read.notes, *read.report)))
+
+
+def _asked(scene: bpy.types.Scene) -> list[str]:
+    """The arguments that decide what comes out."""
+    settings, match = scene.beyond_mocap, scene.beyond_mocap_match
+    if not match.tracking_file:
+        raise InputError("match", "no tracking file", "a provider's tracking of a match", "choose one, or drop it here")
+    out = ["--tracking", absolute(match.tracking_file), "--library", _library(settings)]
+    for option, path in (("--meta", match.metadata_file), ("--events", match.events_file)):
+        out += [option, absolute(path)] if path else []
+    out += ["--provider", match.provider] if match.provider != AUTO else []
+    if match.events_file:
+        out += ["--events-meta", absolute(match.events_metadata_file)] if match.events_metadata_file else []
+        out += ["--events-provider", match.events_provider] if match.events_provider != AUTO else []
+    if 0.0 < match.end <= match.start:
+        found = f"To ({typed(match.end)} s) is not after From ({typed(match.start)} s)"
+        raise InputError("match", found, "a later time",
+                         "set To, or set it to 0 for the match's end")
+    out += ["--from", typed(match.start)] + (["--to", typed(match.end)] if match.end else [])
+    out += _players(match)
+    out += [] if match.solve_touches else ["--no-solve-touches"]
+    out += ["--fps", typed(settings.rate), "--seed", str(settings.seed)]
+    return out + (["--unit", typed(settings.library_unit)] if settings.library_unit else [])
 
 
 def _players(match: BeyondMocapMatch) -> list[str]:

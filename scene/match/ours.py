@@ -6,7 +6,7 @@ from __future__ import annotations
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from .people import TEAMS
+from .load import TEAMS
 
 MARK = "beyond_mocap_match"
 PLAYER = "beyond_mocap_match_player"

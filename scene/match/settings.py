@@ -5,15 +5,7 @@ from __future__ import annotations
 
 import bpy
 import numpy as np
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    FloatVectorProperty,
-    IntProperty,
-    StringProperty,
-)
+from bpy.props import CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
 from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
@@ -25,9 +17,8 @@ AUTO = "AUTO"
 GUESS = (AUTO, "Guess", "By what the file looks like")
 GIVEN = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in PROVIDERS.values())]
 TOLD = [GUESS, *((one.name, one.title, one.files.replace("`", "")) for one in EVENT_PROVIDERS.values())]
-KINDS = (
-    ("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"),
-)
+COLOUR = {"subtype": "COLOR", "size": 3, "min": 0.0, "max": 1.0}
+KINDS = (("home", "Home", "The home team"), ("away", "Away", "The away team"), ("referee", "Referee", "Referees"))
 FIRST = 60.0
 """Seconds that are chosen when a match has been read."""
 
@@ -42,7 +33,7 @@ class BeyondMocapMatchPlayer(bpy.types.PropertyGroup):
     """One player of a match; `name` is what he is called."""
 
     feed_id: StringProperty(name="ID", description="As the feed has it")
-    use: BoolProperty(name="Use", default=True, description="Make and show this player")
+    use: bpy.props.BoolProperty(name="Use", default=True, description="Make and show this player")
     number: IntProperty(name="Number", default=-1, description="On the shirt; -1 where the feed has none")
     team: EnumProperty(name="Team", items=KINDS, description="Whom he belongs to")
     position: StringProperty(name="Position", description="Where he plays, where the feed tells")
@@ -53,7 +44,6 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
     """A match: what it is made from, what is wanted of it, and what is shown."""
 
     attached_to = ("Scene.beyond_mocap_match",)
-
     tracking_file: StringProperty(name="Tracking", description="A provider's tracking of a whole match", **FILE)
     metadata_file: StringProperty(
         name="Metadata", description="The provider's second file; empty: one beside the first whose name fits", **FILE
@@ -72,18 +62,12 @@ class BeyondMocapMatch(bpy.types.PropertyGroup):
         description="Where everybody's motion is kept, some megabytes a match. Empty: one for each stretch and choice, "
         "beside the saved file or the tracking",
     )
-    home_colour: FloatVectorProperty(
-        name="Home Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["home"]),
-        description="Colour of the home team's shirts", update=show_colours,
-    )
-    away_colour: FloatVectorProperty(
-        name="Away Shirts", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["away"]),
-        description="Colour of the away team's shirts", update=show_colours,
-    )
-    referee_colour: FloatVectorProperty(
-        name="Referees", subtype="COLOR", size=3, min=0.0, max=1.0, default=linear(USUAL["referee"]),
-        description="Colour of the referees' shirts", update=show_colours,
-    )
+    home_colour: FloatVectorProperty(name="Home Shirts", default=linear(USUAL["home"]), update=show_colours,
+                                     description="Colour of the home team's shirts", **COLOUR)
+    away_colour: FloatVectorProperty(name="Away Shirts", default=linear(USUAL["away"]), update=show_colours,
+                                     description="Colour of the away team's shirts", **COLOUR)
+    referee_colour: FloatVectorProperty(name="Referees", default=linear(USUAL["referee"]), update=show_colours,
+                                        description="Colour of the referees' shirts", **COLOUR)
     players: CollectionProperty(type=BeyondMocapMatchPlayer, description="Who is in the match")
     active: IntProperty(name="Player", min=0, description="The player that is chosen in the list")
     read_of: StringProperty(options={"HIDDEN"}, description="The tracking file that the list was read from")

@@ -1,4 +1,6 @@
-"""A stretch of a match in the scene: pitch, everybody in kit, ball and cameras. Shown again, it takes its own place."""
+"""A stretch of a match in the scene: pitch, everybody in kit, ball and cameras. Shown again, it takes its own place.
+
+Bodies have poses on every frame of their stretches, and are hidden outside them."""
 
 from __future__ import annotations
 
@@ -9,12 +11,16 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.time_series import interpolate
+from ...beyond_mocap.motion.track.ball_path import BallPath
+from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
-from ..stage import pitch, stage
-from . import baked, cameras, ours
+from ..stage import ball, stage
+from . import cameras, ours
 from .bodies import Wardrobe
-from .people import Scenery
+from .load import Person, Scenery
+
+SHOWN = "Shown"  # group of curves
 
 
 def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, float]:
@@ -25,16 +31,16 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
     scene, took = context.scene, {}
     ours.clear(scene)
     ours.include(context.view_layer)
-    last = int(np.floor(baked.frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
+    last = int(np.floor(frame_of(scene, scenery.start, first, scenery.end) + 1e-4))
     with _clock(took, "pitch"):
         _pitch(scene, scenery)
     with _clock(took, "bodies"):
         dressed = _dressed(context, scenery)
     with _clock(took, "keys"):
         for person, worn in dressed:
-            baked.bake(scene, person, worn, start=scenery.start, first=first, last=last)
+            bake_person(scene, person, worn, start=scenery.start, first=first, last=last)
         if scenery.ball is not None:
-            baked.bake_ball(context, scenery.ball, scenery.start, first, last)
+            bake_ball(context, scenery.ball, scenery.start, first, last)
     with _clock(took, "cameras"):
         frames, size = np.arange(first, last + 1), (scenery.length, scenery.width)
         camera = cameras.broadcast(scene, size, frames, _followed(scene, scenery, frames, first))
@@ -42,6 +48,55 @@ def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, 
         scene.camera = camera
     bake.lengthen(scene, last)
     return took
+
+
+def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
+    """The ball of the match that is shown; None where there is none."""
+    return next(iter(ours.meshes(scene, "ball")), None)
+
+
+def frame_of(scene: bpy.types.Scene, start: float, first: int, seconds: float) -> float:
+    """The scene frame (fractional) of a second on the match's clock, where `start` s is frame `first`."""
+    return first + (seconds - start) * frames_per_second(scene)
+
+
+def bake_person(scene: bpy.types.Scene, person: Person, worn: list[bpy.types.Object], start: float, first: int,
+                last: int) -> None:
+    """Let a person's armature (the first of `worn`) move as he does, and everything he wears be hidden outside his
+    stretches; `start` s is scene frame `first`, and `last` the last frame that is shown."""
+    who = worn[0]
+    parts = [action.keyed(who, motion, scene, frame_of(scene, start, first, begins)) for begins,
+             motion in person.motions]
+    frames = np.concatenate([frames for frames, _ in parts])
+    kept = np.concatenate([[True], np.diff(frames) > 0])  # stretches may share a frame
+    curves = {path: (group, np.concatenate([curves[path][1] for _, curves in parts])[kept]) for path,
+              (group, _) in parts[0][1].items()}
+    done = channels.animate(who, f"{who.name} match", frames[kept], curves)
+    done[action.PLACED] = [number for row in who.matrix_world for number in row]
+    ours.mark(done)
+    there = np.zeros(last - first + 1, bool)
+    there[np.clip(frames.astype(int) - first, 0, last - first)] = True
+    if not there.all():
+        hide_outside(worn, there, first)
+
+
+def hide_outside(worn: list[bpy.types.Object], there: np.ndarray, first: int) -> None:
+    """Hide objects, in views and renders, on the frames from `first` on where `there` (F,) is false."""
+    turns = np.flatnonzero(np.diff(there.astype(int)))
+    at = np.unique(np.concatenate([[0], turns, turns + 1]))
+    hidden = np.where(there[at], 0.0, 1.0)[:, None]
+    curves = {name: (SHOWN, hidden) for name in ("hide_viewport", "hide_render")}
+    for thing in worn[1:]:  # an armature has keys of its own, and no surface
+        ours.mark(channels.animate(thing, f"{thing.name} shown", first + at, curves))
+
+
+def bake_ball(context: bpy.types.Context, path: BallPath, start: float, first: int, last: int) -> bpy.types.Object:
+    """The ball with its way and roll, hidden where the path does not reach, and its course as a curve."""
+    scene, home = context.scene, ours.part(context.scene, "ball")
+    thing = ours.mark(ball.create(context, "Match ball", home))
+    ours.mark(ball.write(thing, path, scene, frame_of(scene, start, first, float(path.times[0]))))
+    home.objects.link(ours.mark(_course(scene, path)))
+    return thing
 
 
 @contextmanager
@@ -52,18 +107,13 @@ def _clock(took: dict[str, float], name: str):
     took[name] = perf_counter() - began
 
 
-def ball_shown(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """The ball of the match that is shown; None where there is none."""
-    return next(iter(ours.meshes(scene, "ball")), None)
-
-
 def _pitch(scene: bpy.types.Scene, scenery: Scenery) -> None:
     """Grass, lines, goals and daylight; the "Stage" of single players stands aside while a match is shown."""
     stage.remove(scene)
     home, units, size = ours.part(scene, "pitch"), units_per_metre(scene), (scenery.length, scenery.width)
-    for thing in (pitch.grass(home, units, size), pitch.lines(home, units, size), *pitch.goals(home, units, size[0])):
+    surface = stage.lay_grass(home, units, size), stage.lay_lines(home, units, size)
+    for thing in (*surface, *stage.set_goals(home, units, size[0]), stage.sun(home)):
         ours.mark(thing)
-    ours.mark(stage.sun(home))
     if scene.world is None:
         scene.world = stage.sky()
 
@@ -89,3 +139,17 @@ def _followed(scene: bpy.types.Scene, scenery: Scenery, frames: np.ndarray, firs
                 total[there, axis] += np.interp(seconds[there], times, motion.root_positions[:, axis])
             count += there
     return total / np.maximum(count, 1.0)[:, None]
+
+
+def _course(scene: bpy.types.Scene, path: BallPath) -> bpy.types.Object:
+    """The ball's way as a thin line for the views, hidden at first: a minute of it is a tangle."""
+    data = bpy.data.curves.new("Match ball course", "CURVE")
+    data.dimensions = "3D"
+    line = data.splines.new("POLY")
+    line.points.add(len(path.positions) - 1)
+    placed = np.ones((len(path.positions), 4), np.float32)
+    placed[:, :3] = path.positions * units_per_metre(scene)
+    line.points.foreach_set("co", placed.ravel())
+    thing = bpy.data.objects.new("Match ball course", data)
+    thing.hide_render = thing.hide_select = thing.hide_viewport = True
+    return thing

@@ -4,9 +4,8 @@
 - `colours`   one table of colours that all eyes tell apart
 - `shapes`    vertex arrays of soles, rails, bars, figures
 - `prepare`   a take as vertex arrays and lines of text; knows neither bpy nor gpu
-- `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them
-- `place`     where a take lies in the scene now, and its clock
+- `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them; where they lie
 - `rides`     paths, trackers, residuals and the original motion of what rides a path
-- `ball_shots` the ways of aimed balls, where they are struck and where they bounce
-- `draw`      the handlers of the view: they only look up
+- `ball_paths` the trajectories of aimed balls and passing scenes, where they are struck and where they bounce
+- `draw`      the handlers of the view: they only look up; the legend
 """

@@ -1,4 +1,5 @@
-"""The handlers of the 3D view. Nothing is worked out here: batches are made once of what `prepare` made, then drawn.
+"""The handlers of the 3D view. Nothing is worked out here: batches are made once of what `prepare` made, then drawn,
+and beside them texts and the legend of what is switched on.
 
 Depth is tested against the scene with a small bias towards the eye, since what lies on the ground lies there with the
 pitch's own lines, and far away the depth buffer cannot tell centimetres.
@@ -8,23 +9,30 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import blf
 import bpy
 import gpu
 from bpy_extras.view3d_utils import location_3d_to_region_2d
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix, Vector
 
+from ..core import window
 from ..core.live import Watcher
 from ..core.settings import active_player
-from . import ball_rallies, ball_shots, colours, legend, place, rides, shapes, store
+from . import ball_paths, colours, rides, shapes, store
 from .prepare import Mesh, Prepared
 
 BIAS = 1e-5
 DISC, LIFT = 0.12, 0.034  # metres: radius of a contact's disc, its height above the ground
 MOST_LABELS = 12
+SIZE, MARGIN, LINE = 11, 5, 1.4  # points, points, sizes
+SWATCH = 150  # points: length of a colour scale
+FONT = 0
+GROUND = (0.03, 0.03, 0.03, 0.72)  # what text stands on
 
 _batches: dict[tuple, list] = {}
 _owners: dict[str, Prepared] = {}
+_square: list = []
 
 
 class Shown(NamedTuple):
@@ -41,7 +49,46 @@ def free() -> None:
     """Free what was drawn."""
     _batches.clear()
     _owners.clear()
-    legend.free()
+    _square.clear()
+
+
+def write_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
+    """Lines of text, the first on top, on a dark ground whose lower left corner is at pixel x, y."""
+    size, margin, text = SIZE * scale, MARGIN * scale, "\n".join(lines)
+    blf.size(FONT, size)
+    blf.enable(FONT, blf.WORD_WRAP)  # breaks at line ends too, so that one call draws all lines
+    blf.word_wrap(FONT, 10000)
+    width, height = blf.dimensions(FONT, text)
+    draw_box(x, y, width + 2 * margin, height + 2.4 * margin, (*GROUND[:3], GROUND[3] * strength))
+    blf.color(FONT, 1.0, 1.0, 1.0, strength)
+    blf.position(FONT, x + margin, y + margin + height - 0.78 * size, 0.0)
+    blf.draw(FONT, text)
+    blf.disable(FONT, blf.WORD_WRAP)
+
+
+def draw_box(x: float, y: float, width: float, height: float, colour) -> None:
+    """A filled rectangle in pixels."""
+    shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+    if not _square:
+        _square.append(batch_for_shader(shader, "TRIS", {"pos": [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]}))
+    with gpu.matrix.push_pop():
+        gpu.matrix.translate((x, y))
+        gpu.matrix.scale((width, height))
+        shader.bind()
+        shader.uniform_float("color", colour)
+        _square[0].draw(shader)
+
+
+def draw_legend(context, on: list[str]) -> None:
+    """The legend in the view's lower left corner, a row for each overlay that needs one."""
+    rows = [row for name, row in ROWS.items() if name in on]
+    if not rows:
+        return
+    scale = context.preferences.system.ui_scale
+    left, bottom, _, _ = window.free_region(context.area, context.region)
+    x, y = left + 8 * scale, bottom + 8 * scale
+    for row in reversed(rows):
+        y += row(x, y, scale) + 4 * scale
 
 
 def _shown(context) -> list[Shown]:
@@ -50,12 +97,12 @@ def _shown(context) -> list[Shown]:
     space = context.space_data
     if settings is None or not settings.view.on() or not space.overlay.show_overlays:
         return []
-    active, seconds = active_player(settings), place.seconds_at(context.scene)
+    active, seconds = active_player(settings), store.seconds_at(context.scene)
     found = []
     for player in store.shown_players(settings):
         prepared = store.prepared(player.take)
         if prepared is not None:
-            world = place.take_to_world(context.scene, player.body)
+            world = store.take_to_world(context.scene, player.body)
             found.append(Shown(player.take, prepared, world, seconds, player == active))
     _forget({shown.take: shown.prepared for shown in found})
     return found
@@ -75,7 +122,7 @@ def _riding(context) -> list[rides.Item]:
     """What there is to draw of riders and balls in this view; the batches of what is drawn no more are freed."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
-        items = [*rides.items(context.scene), *ball_shots.items(context.scene), *ball_rallies.items(context.scene)]
+        items = [*rides.items(context.scene), *ball_paths.items(context.scene)]
     now = {item.key for item in items}
     for key in [key for key in _batches if not isinstance(key[0], str) and key not in now]:
         del _batches[key]
@@ -181,7 +228,8 @@ def _disc() -> list[Mesh]:
 
 def _draw_texts():
     context = bpy.context
-    found, riding, shot = _shown(context), _rides(context), _shots(context)
+    found, over = _shown(context), context.space_data.overlay.show_overlays
+    riding, shot = over and rides.seen(context.scene), over and ball_paths.any_seen(context.scene)
     if not found and not riding and not shot:
         return
     view = context.scene.beyond_mocap.view
@@ -193,20 +241,9 @@ def _draw_texts():
                 _near_labels(context, view, shown)
             if "seams" in on:
                 _why(context, view, shown)
-        legend.draw(context, [*(on if found else ()), *(["rides"] if riding else ()), *(["shots"] if shot else ())])
+        draw_legend(context, [*(on if found else ()), *(["rides"] if riding else ()), *(["shots"] if shot else ())])
     finally:
         gpu.state.blend_set("NONE")
-
-
-def _rides(context) -> bool:
-    """Whether anything of riders is drawn in this view."""
-    return context.space_data.overlay.show_overlays and bool(rides.seen(context.scene))
-
-
-def _shots(context) -> bool:
-    """Whether anything of balls is drawn in this view."""
-    shown = context.space_data.overlay.show_overlays
-    return shown and (bool(ball_shots.seen(context.scene)) or ball_rallies.seen(context.scene) is not None)
 
 
 def _near_labels(context, view, shown: Shown) -> None:
@@ -235,9 +272,66 @@ def _text(context, where: Vector, lines, strength: float, shift: tuple[float, fl
     if at is None or not (-50 < at.x < region.width + 50 and -50 < at.y < region.height + 50):
         return
     scale = context.preferences.system.ui_scale
-    legend.write(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
+    write_lines(at.x + shift[0] * scale, at.y + shift[1] * scale, lines, scale, strength)
 
 
-WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=(
-    (bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"), (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL"),
-))
+def _scale(title: str, stops, factor: float, unit: str):
+    """A row that shows a colour scale with its numbers."""
+
+    def row(x: float, y: float, scale: float) -> float:
+        size, margin = SIZE * scale, MARGIN * scale
+        step, width = LINE * size, SWATCH * scale
+        height = 2 * step + 0.6 * size + 2 * margin
+        draw_box(x, y, width + 6 * margin, height, GROUND)
+        part = width / len(stops)
+        blf.size(FONT, size)
+        for number, (stop, rgb) in enumerate(zip(stops, colours.SCALE)):
+            left = x + margin + number * part
+            draw_box(left, y + margin + step, part, 0.6 * size, (*rgb, 1.0))
+            _write_line(left, y + margin + 0.2 * size, f"{factor * stop:g}", size)
+        _write_line(x + margin + width, y + margin + 0.2 * size, unit, size)
+        _write_line(x + margin, y + margin + step + 0.9 * size, title, size)
+        return height
+
+    return row
+
+
+def _keys(*entries: tuple[str, tuple]):
+    """A row of coloured squares with words."""
+
+    def row(x: float, y: float, scale: float) -> float:
+        size, margin = SIZE * scale, MARGIN * scale
+        blf.size(FONT, size)
+        widths = [blf.dimensions(FONT, text)[0] + 2.4 * size for text, _ in entries]
+        height = LINE * size + 2 * margin
+        draw_box(x, y, sum(widths) + 2 * margin, height, GROUND)
+        left = x + margin
+        for (text, rgb), width in zip(entries, widths):
+            draw_box(left, y + margin + 0.25 * size, 0.8 * size, 0.8 * size, (*rgb, 1.0))
+            _write_line(left + 1.2 * size, y + margin + 0.3 * size, text, size)
+            left += width
+        return height
+
+    return row
+
+
+def _write_line(x: float, y: float, text: str, size: float) -> None:
+    blf.size(FONT, size)
+    blf.color(FONT, 1.0, 1.0, 1.0, 1.0)
+    blf.position(FONT, x, y, 0.0)
+    blf.draw(FONT, text)
+
+
+WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
+                                                                (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
+ROWS = {
+    "track": _scale("Off the track", colours.ROOT_STOPS, 100.0, "cm"),
+    "footprints": _scale("Standing foot slides", colours.SLIDE_STOPS, 1000.0, "mm"),
+    "speed": _keys(("asked speed", colours.ASKED), ("the body's", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
+    "contacts": _keys(("left", colours.LEFT), ("right", colours.RIGHT)),
+    "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("a tick: 1 s", colours.GREY)),
+    "shots": _keys(("the ball's way", colours.WHITE), ("other ways", colours.BLACK),
+                   ("after the target", colours.VERMILION), ("striking part", colours.SKY),
+                   ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
+    "moments": _keys(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),
+}

@@ -33,6 +33,22 @@ class Mesh:
     width: float = 1.0
 
 
+def line_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """A broken line through points (T, 3) m."""
+    return repeated_mesh(shapes.along(points), colour, width, alpha)
+
+
+def segments_mesh(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """Lines from start to end, both (..., 3) m."""
+    points = np.stack([start, end], axis=-2).reshape(-1, 3).astype(np.float32)
+    return repeated_mesh(points, colour, width, alpha)
+
+
+def repeated_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
+    """Lines of one colour between pairs of points (2 N, 3) m."""
+    return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
+
+
 @dataclass(frozen=True)
 class Piece:
     """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it
@@ -98,28 +114,18 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
     ground = view.played.pelvis if view.wanted is None else figures.track
     skeleton = take.motion.skeleton
     pairs = shapes.figure_pairs(skeleton.parents)
-    meshes = {
-        "track": _track(figures),
-        "footprints": _footprints(footprints(view)),
-        "seams": _seams(view.played.pelvis, take.seams),
-        "moments": _moments(met, take),
-        "speed": _speed(ground, figures),
-    }
-    return Prepared(
-        start=float(take.start_time),
-        fps=float(take.motion.fps),
-        count=len(take.motion),
-        meshes={name: found for name, found in meshes.items() if found},
-        pelvis=positions[:, view.played.body.hips],
-        toes=view.played.feet[:, :, 1].astype(np.float32),
-        stands=view.played.contacts,
-        figures=positions,
-        pairs=pairs,
-        pair_colours=_pair_colours(skeleton.names, pairs),
-        seams=tuple(int(seam) for seam in take.seams),
-        pieces=_pieces(plan, take, library, view.played.pelvis),
-        labels=tuple(_label(strike) for strike in met),
-    )
+    meshes = {"track": _track(figures),
+              "footprints": _footprints(footprints(view)),
+              "seams": _seams(view.played.pelvis, take.seams),
+              "moments": _moments(met, take),
+              "speed": _speed(ground, figures)}
+    return Prepared(start=float(take.start_time), fps=float(take.motion.fps), count=len(take.motion),
+                    meshes={name: found for name, found in meshes.items() if found},
+                    pelvis=positions[:, view.played.body.hips], toes=view.played.feet[:, :, 1].astype(np.float32),
+                    stands=view.played.contacts, figures=positions, pairs=pairs,
+                    pair_colours=_pair_colours(skeleton.names, pairs), seams=tuple(int(seam) for seam in take.seams),
+                    pieces=_pieces(plan, take, library, view.played.pelvis),
+                    labels=tuple(_label(strike) for strike in met))
 
 
 def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
@@ -140,10 +146,8 @@ def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
     slide = colours.scaled(np.array([p.slide for p in found]), colours.SLIDE_STOPS, 0.8)
     sides = np.array([(*colours.LEFT, 1.0), (*colours.RIGHT, 1.0)], np.float32)[side]
     edge[:, 2] = SOLE_EDGE
-    return (
-        Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
-        Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0),
-    )
+    return (Mesh("TRIS", fill, slide.repeat(len(fill) // len(found), axis=0)),
+            Mesh("LINES", edge, sides.repeat(len(edge) // len(found), axis=0), 2.0))
 
 
 def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
@@ -151,10 +155,7 @@ def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
     if not len(seams):
         return ()
     points = shapes.bars(pelvis, np.asarray(seams, int), HALF_SEAM, SEAM)
-    return (
-        Mesh("LINES", points, colours.repeated(colours.BLACK, len(points), 0.8), 5.0),
-        Mesh("LINES", points, colours.repeated(colours.SEAM, len(points)), 2.5),
-    )
+    return repeated_mesh(points, colours.BLACK, 5.0, 0.8), repeated_mesh(points, colours.SEAM, 2.5)
 
 
 def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
@@ -183,12 +184,9 @@ def _speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
         return ()
     asked, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.asked_speed, figures.speed))
     fill = shapes.curtain(path, asked, SPEED_FOOT)
-    over = [shapes.along(np.concatenate([path, top[:, None]], axis=1)) for top in (asked, played)]
-    return (
-        Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
-        Mesh("LINES", over[0], colours.repeated(colours.ASKED, len(over[0])), 1.5),
-        Mesh("LINES", over[1], colours.repeated(colours.PLAYED, len(over[1])), 2.0),
-    )
+    over = [np.concatenate([path, top[:, None]], axis=1) for top in (asked, played)]
+    return (Mesh("TRIS", fill, colours.repeated(colours.ASKED, len(fill), 0.22)),
+            line_mesh(over[0], colours.ASKED, 1.5), line_mesh(over[1], colours.PLAYED, 2.0))
 
 
 def _pair_colours(names: tuple[str, ...], pairs: np.ndarray) -> np.ndarray:
@@ -208,13 +206,9 @@ def _label(strike: "Strike") -> Label:
 def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
     """The pieces, with the reasons of the search where its library is known."""
     last = len(pelvis) - 1
-    return tuple(
-        Piece(
-            take.start_time + start, take.start_time + end,
-            (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines,
-        )  # fmt: skip
-        for start, end, name, lines in _told(plan, take, library)
-    )
+    return tuple(Piece(take.start_time + start, take.start_time + end,
+                       (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
+                 for start, end, name, lines in _told(plan, take, library))
 
 
 def _told(plan: "Plan", take: "Take", library: "Library | None"):

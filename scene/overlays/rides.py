@@ -17,7 +17,7 @@ from ..core.measure import units_per_metre
 from ..path_editing import riders
 from ..path_editing.settings import riders as riding
 from . import colours, shapes
-from .prepare import Mesh
+from .prepare import Mesh, line_mesh, repeated_mesh, segments_mesh
 
 if TYPE_CHECKING:
     from ...beyond_mocap.path_editing.ride import Ridden, RideSource
@@ -63,22 +63,18 @@ def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> l
     if "path_new" in on:
         found.append(Item((ridden, "path"), lambda: new_path(ridden, shown.line), world))
     if "path_residuals" in on:
-        found.append(
-            Item((source, "residuals"), lambda: residuals(source.motion, source.moving.origin, ORIGINAL), world)
-        )
-        found.append(Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world))
-        found.append(
-            Item((source, "residual", was), lambda: residual(source.motion, source.moving.origin, was, ORIGINAL), world)
-        )
-        found.append(Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world))
+        origin = source.moving.origin
+        found += [Item((source, "residuals"), lambda: residuals(source.motion, origin, ORIGINAL), world),
+                  Item((ridden, "residuals"), lambda: residuals(ridden.motion, ridden.origin, NEW), world),
+                  Item((source, "residual", was), lambda: residual(source.motion, origin, was, ORIGINAL), world),
+                  Item((ridden, "residual", row), lambda: residual(ridden.motion, ridden.origin, row, NEW), world)]
     if "path_ghost" in on:
         found.append(Item((source, "ghost", was), lambda: figure(source, was), world))
     if "path_trackers" in on:
-        for name, colour, origin, heading in (
-            ("original", ORIGINAL, source.moving.origin[was], source.moving.heading[was]),
-            ("new", NEW, ridden.origin[row], ridden.heading[row]),
-        ):
-            there = world @ Matrix.Translation(origin.tolist()) @ Matrix.Rotation(float(heading), 4, "Z")
+        for name, colour, place, heading in (
+                ("original", ORIGINAL, source.moving.origin[was], source.moving.heading[was]),
+                ("new", NEW, ridden.origin[row], ridden.heading[row])):
+            there = world @ Matrix.Translation(place.tolist()) @ Matrix.Rotation(float(heading), 4, "Z")
             found.append(Item(("", "tracker", name), lambda colour=colour: tracker(colour), there))
     return found
 
@@ -113,7 +109,7 @@ def figure(source: "RideSource", row: int) -> list[Mesh]:
     motion = source.motion
     places, _ = pose_kinematics(motion.skeleton, motion.root_positions[row : row + 1], motion.rotations[row : row + 1])
     points = places[0][shapes.figure_pairs(motion.skeleton.parents)].reshape(-1, 3).astype(np.float32)
-    return [Mesh("LINES", points, colours.repeated(ORIGINAL, len(points), 0.8), 2.5)]
+    return [repeated_mesh(points, ORIGINAL, 2.5, 0.8)]
 
 
 def tracker(colour) -> list[Mesh]:
@@ -122,7 +118,7 @@ def tracker(colour) -> list[Mesh]:
     arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT),
              (back, -0.08, LIFT)]
     points = np.concatenate([shapes.circle((0.0, 0.0, LIFT), RING), np.array(arrow, np.float32)])
-    return [Mesh("LINES", points, colours.repeated(colour, len(points)), WIDE)]
+    return [repeated_mesh(points, colour, WIDE)]
 
 
 def _ridden(ridden: "Ridden") -> list[Mesh]:
@@ -133,13 +129,11 @@ def _ridden(ridden: "Ridden") -> list[Mesh]:
 
 
 def _line(points: np.ndarray, colour, width: float, alpha: float) -> Mesh:
-    lines = shapes.along(points + [0.0, 0.0, LIFT])
-    return Mesh("LINES", lines, colours.repeated(colour, len(lines), alpha), width)
+    return line_mesh(points + [0.0, 0.0, LIFT], colour, width, alpha)
 
 
 def _strokes(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float) -> Mesh:
-    points = np.stack([start + [0.0, 0.0, LIFT], end], axis=1).reshape(-1, 3).astype(np.float32)
-    return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
+    return segments_mesh(start + [0.0, 0.0, LIFT], end, colour, width, alpha)
 
 
 def _ticks(origin: np.ndarray, heading: np.ndarray, fps: float, colour) -> Mesh:
@@ -148,4 +142,4 @@ def _ticks(origin: np.ndarray, heading: np.ndarray, fps: float, colour) -> Mesh:
     rows = rows[rows < len(origin)]
     aside = HALF_TICK * np.stack([-np.sin(heading[rows]), np.cos(heading[rows]), np.zeros(len(rows))], axis=1)
     points = np.stack([origin[rows] - aside, origin[rows] + aside], axis=1).reshape(-1, 3) + [0.0, 0.0, LIFT]
-    return Mesh("LINES", points.astype(np.float32), colours.repeated(colour, len(points)), 2.0)
+    return repeated_mesh(points.astype(np.float32), colour, 2.0)

@@ -40,5 +40,4 @@ class BeyondMocapPlayhead(bpy.types.PropertyGroup):
     """What there is to tell about the current frame; on the window manager, so that undo leaves it alone."""
 
     attached_to = ("WindowManager.beyond_mocap_playhead",)
-
     why: StringProperty(description="Lines on why the clip at the playhead is played")

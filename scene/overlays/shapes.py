@@ -30,10 +30,8 @@ def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.nda
     corners = heel[:, None] + x[..., None] * ahead[:, None] + y[..., None] * aside[:, None]
     middle = np.broadcast_to((heel + 0.3 * length[:, None] * ahead)[:, None], corners.shape)
     after = np.roll(corners, -1, axis=1)
-    return (
-        on_ground(np.stack([middle, corners, after], axis=2).reshape(-1, 2), height),
-        on_ground(np.stack([corners, after], axis=2).reshape(-1, 2), height),
-    )
+    return (on_ground(np.stack([middle, corners, after], axis=2).reshape(-1, 2), height),
+            on_ground(np.stack([corners, after], axis=2).reshape(-1, 2), height))
 
 
 def rails(path: np.ndarray, inner: float, outer: float, height: float) -> tuple[np.ndarray, np.ndarray]:

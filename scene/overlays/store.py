@@ -9,11 +9,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import bpy
+from mathutils import Matrix
 
 from ..core import background, session, window
+from ..core.action import PLACED
 from ..core.live import Watcher, soon
+from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import active_row
-from . import place
 
 if TYPE_CHECKING:
     from .prepare import Prepared
@@ -65,10 +67,24 @@ def tell_why(scene: bpy.types.Scene) -> None:
     manager, settings = bpy.context.window_manager, scene.beyond_mocap
     player = active_row(settings.players, settings.active_player)
     found = prepared(player.take) if player is not None and player.take else None
-    piece = found.piece(place.seconds_at(scene)) if found else None
+    piece = found.piece(seconds_at(scene)) if found else None
     text = "\n".join(piece.lines) if piece else ""
     if manager is not None and manager.beyond_mocap_playhead.why != text:
         manager.beyond_mocap_playhead.why = text
+
+
+def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
+    """What the tracking file's clock shows at a scene frame, or now."""
+    settings = scene.beyond_mocap
+    frame = scene.frame_current_final if frame is None else frame
+    return settings.start_time + (frame - settings.start_frame) / frames_per_second(scene)
+
+
+def take_to_world(scene: bpy.types.Scene, body: bpy.types.Object | None) -> Matrix:
+    """From a take's metres to the scene's units: where the body was, and with it where the user has moved it since."""
+    scale = Matrix.Scale(units_per_metre(scene), 4)
+    written = _written(body) if body is not None else None
+    return scale if written is None else body.matrix_world @ written.inverted_safe() @ scale
 
 
 def _file_changed(*_) -> None:
@@ -131,7 +147,22 @@ def _poll() -> float | None:
     return WAIT
 
 
-WATCHER = Watcher(
-    name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed, loaded=_file_changed,
-    ends=clear,
-)
+def _written(body: bpy.types.Object) -> Matrix | None:
+    """The armature's matrix when its take was written."""
+    for action in _actions(body):
+        if (numbers := action.get(PLACED)) is not None:
+            rows = list(numbers)
+            return Matrix([rows[i : i + 4] for i in range(0, 16, 4)])
+    return None
+
+
+def _actions(body: bpy.types.Object):
+    """The actions that an object plays: its own, and those of its strips."""
+    data = body.animation_data
+    if data is not None:
+        yield from filter(None, [data.action])
+        yield from (strip.action for track in data.nla_tracks for strip in track.strips if strip.action)
+
+
+WATCHER = Watcher(name="Overlays", changed=_file_changed, framed=_frame_changed, restored=_file_changed,
+                  loaded=_file_changed, ends=clear)

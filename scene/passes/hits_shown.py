@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import action, channels, linked
+from ..core import action, channels
 from ..core.live import Watcher
 from ..path_editing.rigs import carrier_of, rides_as_rig
 from . import graph
@@ -43,7 +43,7 @@ def analyse(
     """
     from ...beyond_mocap.passes.hits import analyse as find
 
-    linked.refuse(body)
+    channels.check_local(body)
     motion, first = motion_of(scene, body)
     if not np.isfinite(motion.root_positions).all() or not np.isfinite(motion.rotations).all():
         raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")

@@ -13,7 +13,7 @@ from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.passes.pass_scene import Net, PassScene
-from ..core import action, channels, linked, preferences, session
+from ..core import action, channels, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, drop, put_aside
 from ..core.settings import absolute
@@ -72,7 +72,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
     for row in settings.players:
         _check(row)
     shown.check(*settings.players)
-    linked.refuse(settings.rally)
+    channels.check_local(settings.rally)
     if settings.rally is not None:
         channels.check_free(settings.rally)
         possession.check_unaimed(settings.rally)
@@ -174,7 +174,7 @@ def _check(row: BeyondMocapPasser) -> None:
     target = row.body
     if target is None:
         return
-    linked.refuse(target)
+    channels.check_local(target)
     channels.check_free(target)
     override = target.override_library
     if override is not None and override.is_system_override:

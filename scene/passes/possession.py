@@ -20,7 +20,7 @@ from mathutils import Matrix, Quaternion, Vector
 from ...beyond_mocap.base.easing import smoothstep
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
-from ..core import channels, linked
+from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
 from ..path_editing.rig_look import alone
@@ -81,7 +81,7 @@ def take(
 
 def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = None) -> None:
     """Take back one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
-    linked.refuse(ball)
+    channels.check_local(ball)
     channels.check_free(ball)
     check_unaimed(ball)
     own = ball.beyond_mocap_ball
@@ -176,7 +176,7 @@ def check_unaimed(ball: bpy.types.Object) -> None:
 
 
 def _check(ball, body, bone: str, first: int, last: int) -> None:
-    linked.refuse(ball)
+    channels.check_local(ball)
     channels.check_free(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:

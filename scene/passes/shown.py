@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import bpy
 
-from ..core import channels, linked
+from ..core import channels
 from ..core.set_aside import bring_back, drop
 from . import held_tool
 from .settings import KEPT, BeyondMocapPasser
@@ -15,7 +15,7 @@ def check(*rows: BeyondMocapPasser) -> None:
     """InputError where the body that shows a player's motion cannot be given back."""
     for row in rows:
         if row.shown is not None:
-            linked.refuse(row.shown)
+            channels.check_local(row.shown)
             channels.check_free(row.shown)
 
 

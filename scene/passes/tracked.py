@@ -10,9 +10,8 @@ import numpy as np
 
 from ...beyond_mocap.ball.tracked.kinds import TOUCH_KINDS
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels, linked
-from ..core.clock import of_scene
-from ..core.measure import frames_per_second
+from ..core import channels
+from ..core.measure import frames_per_second, scene_clock
 from ..core.settings import BeyondMocapPlayer, absolute, active_player
 from ..player import dots, tracks
 from ..result import bake
@@ -99,7 +98,7 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
     own = next((thing for thing in room.objects if thing.get(KEPT) == BALL), None)
     target = own or ball.create(bpy.context, BALL, room)
-    linked.refuse(target)
+    channels.check_local(target)
     channels.check_free(target)
     possession.check_unaimed(target)
     times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))
@@ -132,7 +131,7 @@ def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
         if line:
             told.append(line)
             continue
-        lay_strips.add_moment(player.dot, said(touch.words, round(touch.time, 3)), of_scene(context.scene))
+        lay_strips.add_moment(player.dot, said(touch.words, round(touch.time, 3)), scene_clock(context.scene))
         touch.use = False
         count += 1
     return count, told
@@ -166,7 +165,7 @@ def _list(scene, solved: "SolvedBall") -> None:
 def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
     """Why a touch becomes no key moment of a player; "" where it may. He has a timeline afterwards."""
     target = strips.with_lanes(context, player)
-    clock = of_scene(context.scene)
+    clock = scene_clock(context.scene)
     first, last = (clock.seconds(frame) for frame in _ends(player))
     if not first <= touch.time <= last:
         return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
@@ -183,6 +182,6 @@ def _ends(player) -> tuple[float, float]:
 
 def _frames_between(scene, start: float, end: float) -> np.ndarray:
     """The seconds of all whole scene frames from one second to another."""
-    clock, fps = of_scene(scene), frames_per_second(scene)
+    clock, fps = scene_clock(scene), frames_per_second(scene)
     frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
     return clock.start_time + (frames - clock.start_frame) / fps

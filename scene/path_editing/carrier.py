@@ -15,7 +15,7 @@ from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
-from ..core import action, channels, linked
+from ..core import action, channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
 from ..rigs import armature
@@ -65,7 +65,7 @@ class Carrier(ABC):
     def check(self) -> None:
         """InputError where the armature cannot ride."""
         body = self.body
-        linked.refuse(body)
+        channels.check_local(body)
         override = body.override_library
         if override is not None and override.is_system_override:
             raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
@@ -119,7 +119,7 @@ class Carrier(ABC):
             raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride",
                              "that action",
                              "choose it again in the Action Editor, or press Leave")
-        linked.refuse(found)
+        channels.check_local(found)
         if found.users - found.use_fake_user < 2:
             return found, slot
         copy = found.copy()

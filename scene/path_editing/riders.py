@@ -11,7 +11,7 @@ import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
-from ..core import channels, linked
+from ..core import channels
 from ..core.set_aside import drop, play_as_before
 from . import curve, keys, source
 from .carrier import MARK
@@ -254,7 +254,7 @@ def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Acti
 
 def may_end(body: bpy.types.Object) -> None:
     """InputError where an armature's original motion cannot be brought back here."""
-    linked.refuse(body)
+    channels.check_local(body)
     channels.check_free(body)
 
 

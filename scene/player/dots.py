@@ -10,8 +10,7 @@ import numpy as np
 
 from ...beyond_mocap.motion.track import Track
 from ..core import channels
-from ..core.clock import Clock, of_scene
-from ..core.measure import units_per_metre
+from ..core.measure import Clock, scene_clock, units_per_metre
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, as_setting
 from ..result import bake
 from .tracks import read_track
@@ -28,7 +27,6 @@ class BeyondMocapDot(bpy.types.PropertyGroup):
     """Which player's dot this is: what a file that it is appended to needs to go on with him."""
 
     attached_to = ("Object.beyond_mocap_dot",)
-
     player: bpy.props.StringProperty(name="Player", description="The player's name")
     tracking_file: bpy.props.StringProperty(name="Tracking", description="The file with the player's positions")
     metadata_file: bpy.props.StringProperty(name="Metadata", description="The provider's second file")
@@ -50,7 +48,7 @@ def ensure(context: bpy.types.Context, player: BeyondMocapPlayer) -> bpy.types.O
     dot = _empty(context.scene, f"{player.name} dot", SIZE, room)
     player.dot = dot
     show(player)
-    clock = of_scene(context.scene)
+    clock = scene_clock(context.scene)
     seconds, places = _measured(track.times, track.positions)
     _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), clock)
     if BALL not in room.objects:
@@ -67,7 +65,7 @@ def renew(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     track = read_track(context.scene.beyond_mocap, player)
     seconds, places = _measured(track.times, track.positions)
     channels.discard(dot, MARK)
-    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), of_scene(context.scene))
+    _animate(context.scene, dot, seconds, np.pad(places, ((0, 0), (0, 1))), scene_clock(context.scene))
 
 
 def show(player: BeyondMocapPlayer) -> None:

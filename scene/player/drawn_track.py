@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import distance_along
@@ -18,11 +19,15 @@ from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.motion.track import Track
 from ...beyond_mocap.motion.track.drawn import along, moved, nurbs_line
 from ..core import channels
-from ..core.clock import of_scene
-from ..core.measure import units_per_metre
+from ..core.live import Watcher
+from ..core.measure import scene_clock, units_per_metre
+from ..core.settings import active_player
 from ..rigs import armature
+from . import drawn_track
 
 FINE = 48  # straight pieces that a Bezier segment is cut into
+
+LABEL_SIZE, RGBA, PIN_RGBA = 12, (1.0, 0.85, 0.2, 1.0), (0.4, 0.9, 1.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +61,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
     if drawn.type == "CURVES":
         raise InputError(f"object {drawn.name}", "hair curves", "a curve (Add > Curve)", "convert it: Object > Convert")
     frames, places = _animated(scene, drawn, still)
-    clock = of_scene(scene)
+    clock = scene_clock(scene)
     seconds = clock.start_time + (frames - clock.start_frame) / clock.fps
     return moved(seconds, places[:, :2] / units_per_metre(scene), f"object {drawn.name}")
 
@@ -188,11 +193,9 @@ def _own_keys(moving: bpy.types.Object) -> tuple[np.ndarray, np.ndarray] | None:
     if ends is None:
         return None
     frames = np.arange(ends[0], ends[1] + 1, dtype=float)
-    columns = [
-        channels.sample(curves["location", axis], frames) if ("location", axis) in curves
-        else np.full(len(frames), moving.location[axis])
-        for axis in range(3)
-    ]
+    columns = [channels.sample(curves["location", axis], frames) if ("location", axis) in curves
+               else np.full(len(frames), moving.location[axis])
+               for axis in range(3)]
     return frames, np.stack(columns, axis=1)
 
 
@@ -212,3 +215,44 @@ def _hips(scene: bpy.types.Scene, moving: bpy.types.Object) -> str:
         if not moving.data.bones:
             raise
         return next(bone.name for bone in moving.data.bones if bone.parent is None)
+
+
+def speed_labels(scene: bpy.types.Scene) -> list[tuple[tuple[float, float, float], str, tuple]]:
+    """What is written where: (place in Blender's units, text, colour)."""
+    player, units = active_player(scene.beyond_mocap), units_per_metre(scene)
+    if player is None:
+        return []
+    found = []
+    drawn = player.drawn_track
+    if drawn is not None and drawn.type == "CURVE" and drawn.visible_get():
+        try:
+            line = drawn_track.line_of(scene, drawn)
+        except InputError:  # told when it is used
+            line = drawn_track.NO_LINE
+        for at, speed, wait in zip(line.at, line.speeds, line.waits):
+            text = f"{speed:.1f} m/s" if speed > 0.0 else f"stop {wait:.1f} s"
+            found.append((tuple(np.array(line.line[at]) * units), text, RGBA))
+    for pin in player.pins:
+        if pin.target is not None and pin.target.visible_get():
+            hold = f" + {pin.hold:.1f}" if pin.hold else ""
+            found.append((tuple(pin.target.matrix_world.translation), f"{pin.time:.1f}{hold} s", PIN_RGBA))
+    return found
+
+
+def _draw_labels() -> None:
+    import blf
+
+    context = bpy.context
+    if context.space_data is None or not context.space_data.overlay.show_overlays:
+        return
+    scale = context.preferences.system.ui_scale
+    for place, text, rgba in speed_labels(context.scene):
+        at = location_3d_to_region_2d(context.region, context.region_data, place)
+        if at is not None:
+            blf.size(0, LABEL_SIZE * scale)
+            blf.color(0, *rgba)
+            blf.position(0, at.x + 8 * scale, at.y + 8 * scale, 0)
+            blf.draw(0, text)
+
+
+WATCHER = Watcher(name="Labels of drawn tracks", draws=((bpy.types.SpaceView3D, _draw_labels, "POST_PIXEL"),))

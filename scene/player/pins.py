@@ -9,17 +9,15 @@ from bpy.props import EnumProperty, FloatProperty, PointerProperty
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.humanoid import identify
 from ...beyond_mocap.synthesis.plan import Pin
-from ..core.clock import of_scene
-from ..core.measure import units_per_metre
+from ..core import window
+from ..core.measure import scene_clock, units_per_metre
 from ..rigs import armature
 
-PARTS = (
-    ("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
-    ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
-    ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
-    ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
-    ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4),
-)
+PARTS = (("left_hand", "Left Hand", "The wrist of the left hand is there", "VIEW_PAN", 0),
+         ("right_hand", "Right Hand", "The wrist of the right hand is there", "VIEW_PAN", 1),
+         ("left_foot", "Left Foot", "The ankle of the left foot is there", "MOD_DYNAMICPAINT", 2),
+         ("right_foot", "Right Foot", "The ankle of the right foot is there", "MOD_DYNAMICPAINT", 3),
+         ("gaze", "Gaze", "The player looks there", "HIDE_OFF", 4))
 SIZE = 0.12  # metres
 AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
 
@@ -27,17 +25,13 @@ AHEAD = 3.0  # metres at which a gaze begins that is made where the head looks
 class BeyondMocapPin(bpy.types.PropertyGroup):
     """One pin of a player; its name is the part's."""
 
-    target: PointerProperty(
-        name="Place", type=bpy.types.Object, description="The Empty that says where; move it with G"
-    )
+    target: PointerProperty(name="Place", type=bpy.types.Object,
+                            description="The Empty that says where; move it with G")
     part: EnumProperty(name="Part", items=PARTS, description="What is held there")
-    time: FloatProperty(
-        name="Time", unit="TIME_ABSOLUTE", precision=2, description="Second on the track's clock at which it is there"
-    )
-    hold: FloatProperty(
-        name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
-        description="Seconds for which it stays there; 0: a moment",
-    )
+    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=2,
+                        description="Second on the track's clock at which it is there")
+    hold: FloatProperty(name="Hold", min=0.0, soft_max=5.0, unit="TIME_ABSOLUTE", precision=2,
+                        description="Seconds for which it stays there; 0: a moment")
 
 
 def read(scene: bpy.types.Scene, player) -> tuple[Pin, ...]:
@@ -65,10 +59,7 @@ def add(context: bpy.types.Context, player, part: str, seconds: float, hold: flo
     player.active_pin = len(player.pins) - 1
     context.view_layer.update()
     if target.name in context.view_layer.objects:  # else its collection is excluded
-        for other in context.selected_objects:
-            other.select_set(False)
-        target.select_set(True)
-        context.view_layer.objects.active = target
+        window.select_only(context, target)
     return target
 
 
@@ -90,9 +81,8 @@ def remove_all(player) -> None:
 def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
     """Where the player's part is on the present frame, or AHEAD metres before his face: (3,) metres in the world."""
     if player.body is None:
-        raise InputError(
-            f"player {player.name}", "no body", "a body to pin", "Synthesize first, or pin at the 3D cursor"
-        )
+        raise InputError(f"player {player.name}", "no body", "a body to pin",
+                         "Synthesize first, or pin at the 3D cursor")
     skeleton = armature.skeleton_of(player.body, context.scene)
     body = identify(skeleton)
     sides = {"left": body.left, "right": body.right}
@@ -115,4 +105,4 @@ def body_place(context: bpy.types.Context, player, part: str) -> np.ndarray:
 
 def second_now(scene: bpy.types.Scene) -> float:
     """What the track's clock shows on the scene's present frame."""
-    return of_scene(scene).seconds(scene.frame_current_final)
+    return scene_clock(scene).seconds(scene.frame_current_final)

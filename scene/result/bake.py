@@ -10,16 +10,18 @@ from ...beyond_mocap.motion.track import sample
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ...beyond_mocap.synthesis.take import Take
 from ..core import action, channels
-from ..core.measure import frames_per_second, whole_frames
+from ..core.material import colour
+from ..core.measure import frames_per_second, units_per_metre, whole_frames
 from ..core.session import Made
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings
-from ..player import curve
 from ..rigs import armature
 from ..stage import ball, body, stage
 
 COLLECTION = "Beyond Mocap"
 BALL = "Ball"
 MARK = "beyond_mocap_take"  # on what was made for a take and may be replaced or taken away by the next one
+
+RIBBON_HEIGHT, RIBBON_WIDTH = 0.015, 0.03  # metres above the ground, half the ribbon's width
 
 
 def frame_at(scene: bpy.types.Scene, seconds: float) -> float:
@@ -38,15 +40,14 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
         target[MARK] = True
         order.body = target
     if settings.make_bodies and not any(child.type == "MESH" for child in target.children):
-        body.create(
-            target, order.name, tuple(order.shirt), collection=room, scene=scene, example=take.motion,
-        )[MARK] = True
+        body.create(target, order.name, tuple(order.shirt), collection=room, scene=scene,
+                    example=take.motion)[MARK] = True
     channels.discard(target, MARK)
     start = frame_at(scene, take.start_time)
     action.write(target, take.motion, scene, start, f"{order.name} take", generated=True)[MARK] = True
     if settings.make_paths:
         ground = sample(made.plan.track, made.plan.fps).positions
-        curve.write(context, track_name(order), ground, tuple(order.shirt), room)
+        write_ribbon(context, track_name(order), ground, tuple(order.shirt), room)
     lengthen(scene, start + take.motion.duration * frames_per_second(scene))
     return target
 
@@ -117,3 +118,29 @@ def _smooth(places: np.ndarray, fps: float) -> np.ndarray:
     padded = np.concatenate([places[:1].repeat(half, axis=0), places, places[-1:].repeat(half, axis=0)])
     total = np.concatenate([np.zeros((1, places.shape[1])), np.cumsum(padded, axis=0)])
     return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+
+
+def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collection) -> bpy.types.Object:
+    """A ribbon along `points` (N, 2) metres, coloured `rgb`; takes the place of that name's object in `collection`."""
+    units = units_per_metre(context.scene)
+    data = bpy.data.curves.new(name, "CURVE")
+    data.dimensions = "3D"
+    data.extrude, data.twist_mode = RIBBON_WIDTH * units, "Z_UP"
+    line = data.splines.new("POLY")
+    line.points.add(len(points) - 1)
+    placed = np.ones((len(points), 4), np.float32)
+    placed[:, :2], placed[:, 2] = np.asarray(points) * units, RIBBON_HEIGHT * units
+    line.points.foreach_set("co", placed.ravel())
+    line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side looks up
+    data.materials.append(colour(f"{name} colour", tuple(rgb), 0.9))
+    ribbon = collection.objects.get(name)
+    if ribbon is None or ribbon.type != "CURVE":
+        ribbon = bpy.data.objects.new(name, data)
+        collection.objects.link(ribbon)
+    else:
+        old, ribbon.data = ribbon.data, data
+        if not old.users:  # a preview may have set it aside
+            bpy.data.curves.remove(old)
+            data.name = name
+    ribbon.hide_select = True
+    return ribbon

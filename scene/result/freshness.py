@@ -3,6 +3,10 @@
 Nothing is worked out while panels are drawn. With a window, a timer looks at one player at a time when something has
 changed (a handler notes that, and whether files have), and writes what it finds beside the file, where undo leaves it
 alone; operators and scripts may ask with `renew`.
+
+Live has a player updated whose track, words or choices have been edited, once the user's hand has come to rest. That an
+edit matters is found by the same comparison, so that neither the preview itself nor a walk along the timeline starts
+anything. First a quick take is made, and when nothing has changed for a while a whole one in its place.
 """
 
 from __future__ import annotations
@@ -29,6 +33,8 @@ from . import bake, blocks, hand_keys, plans, queue
 
 SECONDS = 1.0  # between two looks
 LIBRARY_SECONDS = 10.0  # between two looks at the library's folder
+WHOLE = 0.8  # seconds without a change after which a quick take is made as well as it can be
+MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)  # to Live
 PLAIN = {"STRING", "INT", "FLOAT", "BOOLEAN", "ENUM"}
 CHANGED = {  # what is told where a part of `parts` is another
     "words": "its words have changed since",
@@ -40,6 +46,7 @@ CHANGED = {  # what is told where a part of `parts` is another
 _now: dict = {
     "dirty": True, "left": [], "files": {}, "stamps": {}, "looked": 0.0, "thread": None, "seen": [], "hand": {},
 }
+_edits: dict = {"looked": 0.0, "quick": {}, "begun": {}}
 
 
 class BeyondMocapStale(bpy.types.PropertyGroup):
@@ -279,9 +286,59 @@ def _after_undo() -> None:
     dirty()
 
 
-WATCHER = Watcher(
-    name="What is out of date", changed=_after_change, restored=_after_undo, loaded=_nothing_runs, look=_tick, ends=_end
-)
+def edited_parts(scene: bpy.types.Scene, player) -> dict[str, str]:
+    """What the player asks for, where that is another track, other words or other choices than his newest take was made
+    of; empty where it is not, where he has none, or where what he asks for makes no sense just now."""
+    made_of = json.loads(player.result.made_of or "{}")
+    if not player.take or not made_of:
+        return {}
+    try:
+        asked = parts_of_plan(plans.plan_of(scene.beyond_mocap, player, still=True)[0])
+    except (BeyondMocapError, OSError):
+        return {}
+    return asked if any(made_of.get(name) != value for name, value in asked.items()) else {}
+
+
+def due_update(scene: bpy.types.Scene, now: float) -> tuple[str, str] | None:
+    """(player's name, "quick" or "whole") of whoever is to be updated at second `now`; None where nobody is. The same
+    wish is begun once: what was cancelled, undone or cannot be made waits for the next edit."""
+    players = {player.name: player for player in scene.beyond_mocap.players if player.use}
+    if _edits["looked"] != LIVE.since:
+        for name, player in players.items():
+            asked = edited_parts(scene, player)
+            if asked and _edits["begun"].get(name) != asked:
+                _edits["quick"][name], _edits["begun"][name] = now, asked
+                return name, "quick"
+        _edits["looked"] = LIVE.since
+    for name, since in list(_edits["quick"].items()):
+        if now - max(since, LIVE.since) > WHOLE:
+            del _edits["quick"][name]
+            if name in players and not edited_parts(scene, players[name]):
+                return name, "whole"
+    return None
+
+
+def update_due(scene: bpy.types.Scene) -> bool:
+    """Have a player updated who is to be, where Live is on; whether one may have to be in a while."""
+    if not scene.beyond_mocap.live:
+        _edits["quick"].clear()
+        return False
+    if bpy.context.window_manager.beyond_mocap_work.kind or queue.names() or is_playing():
+        return True
+    found = due_update(scene, time.perf_counter())
+    if found is not None and bpy.ops.beyond_mocap.update_live.poll():
+        bpy.ops.beyond_mocap.update_live("INVOKE_DEFAULT", player=found[0], kind=found[1])
+    return found is not None or bool(_edits["quick"])
+
+
+def forget_edits() -> None:
+    """No wish is known any more."""
+    _edits.update(looked=0.0, quick={}, begun={})
+
+
+WATCHER = Watcher(name="What is out of date", changed=_after_change, restored=_after_undo, loaded=_nothing_runs,
+                  look=_tick, ends=_end)
+LIVE = Watcher(name="Live", matters=MATTERS, settle=update_due, ends=forget_edits)
 
 
 def register():

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..core import channels
-from ..core.clock import Clock
+from ..core.measure import Clock
 from ..path_editing.carrier import original_of
 
 VALUES = "beyond_mocap_values"

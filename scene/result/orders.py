@@ -103,9 +103,8 @@ def work(order: Order, library: "Library | None", progress, cancelled, hurry) ->
     """Make what is ordered, out of the library, which is built where it is None. Never touches bpy."""
     from ...beyond_mocap.library.build import build
 
-    clips = library or build(
-        order.folder, unit=order.unit, **order.build, progress=progress, cancelled=lambda: cancelled() or hurry()
-    )
+    clips = library or build(order.folder, unit=order.unit, **order.build, progress=progress,
+                             cancelled=lambda: cancelled() or hurry())
     plan = order.plan
     validate(plan.timeline, clips.words, float(plan.track.times[0]), float(plan.track.times[-1]), order.where)
     asked = progress, cancelled, hurry

@@ -1,17 +1,20 @@
-"""What the settings ask for, as the core's plans."""
+"""What the settings ask for: players, the core's plans, and the seconds that are meant."""
 
 from __future__ import annotations
+
+import bpy
 
 from ...beyond_mocap.annotation import Timeline
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion.track import Track, clean
 from ...beyond_mocap.synthesis.plan import Plan
+from ..core.measure import scene_clock
 from ..core.properties import property_values
-from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
+from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute, active_player
 from ..player import pins
 from ..player.tracks import read_track
-from ..timeline import strips
-from ..timeline.written import written_in, written_words
+from ..timeline import lanes, strips
+from . import blocks
 
 
 def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
@@ -22,19 +25,13 @@ def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
     return players
 
 
-def plan_of(
-    settings: BeyondMocapSettings, player: BeyondMocapPlayer, still: bool = False
-) -> tuple[Plan, tuple[str, ...]]:
+def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
+            still: bool = False) -> tuple[Plan, tuple[str, ...]]:
     """The plan of one player, and what in the track asks for attention; still: see `drawn_track.read`."""
     track, found = clean(read_track(settings, player, still))
-    plan = Plan(
-        track=track,
-        timeline=timeline_of(player, settings.rate, track),
-        library=absolute(settings.library_folder),
-        pins=pins.read(player.id_data, player),
-        **property_values(Plan, settings, "synthesis"),
-        **property_values(Plan, player, "player"),
-    )
+    plan = Plan(track=track, timeline=timeline_of(player, settings.rate, track),
+                library=absolute(settings.library_folder), pins=pins.read(player.id_data, player),
+                **property_values(Plan, settings, "synthesis"), **property_values(Plan, player, "player"))
     return plan, found.warnings
 
 
@@ -42,9 +39,49 @@ def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline
     """The player's words: from his strips, else from the text of this file, else from the file on disk, else none (all
     automatic)."""
     asked = strips.read(player, player.id_data)
-    return written_words(player, fps, track) if asked is None else asked
+    return strips.written_words(player, fps, track) if asked is None else asked
 
 
 def words_from(player: BeyondMocapPlayer) -> str:
     """Where the words that count are written, for messages."""
-    return written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
+    return strips.written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
+
+
+def selected_stretch(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
+    """Player and seconds on the track's clock; InputError where nothing says which."""
+    clock = scene_clock(scene)
+    for player in scene.beyond_mocap.players:
+        frames = _of_result(player) or _of_words(player, scene)
+        if frames is not None:
+            return player, clock.seconds(frames[0]), clock.seconds(frames[1])
+    player = player_shown(scene)
+    if player is not None and scene.use_preview_range:
+        return player, clock.seconds(scene.frame_preview_start), clock.seconds(scene.frame_preview_end)
+    raise InputError("a stretch made anew", "nothing says which seconds", "a selected strip or a preview range",
+                     "select a strip in the NLA editor, or press P in the timeline and draw a range")
+
+
+def player_shown(scene: bpy.types.Scene) -> BeyondMocapPlayer | None:
+    """The active player, where it has a take; else None."""
+    player = active_player(scene.beyond_mocap)
+    return player if player is not None and player.take else None
+
+
+def _of_result(player: BeyondMocapPlayer) -> tuple[float, float] | None:
+    """The frames of the selected strips of an accepted result."""
+    track = blocks.track_of(player.body) if player.body is not None else None
+    chosen = [strip for strip in track.strips if strip.select] if track is not None and player.body.select_get() else []
+    if not chosen or len(chosen) == len(track.strips) > 1:
+        return None
+    return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)
+
+
+def _of_words(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tuple[float, float] | None:
+    """The frames of the selected spans of words on a player's selected dot."""
+    dot = strips.dot_of(player, scene)
+    if dot is None or not player.take or not dot.select_get():
+        return None
+    chosen = [strip for _, strip in lanes.strips(dot) if strip.select and strip.action.beyond_mocap.kind != "moments"]
+    if not chosen:
+        return None
+    return min(strip.frame_start for strip in chosen), max(strip.frame_end for strip in chosen)

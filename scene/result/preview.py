@@ -1,4 +1,5 @@
-"""A take shown on its player, to be kept or put away: what was there before is set aside and comes back exactly.
+"""A take shown on its player, to be kept or put away: what was there before is set aside and comes back exactly. Of
+several takes to choose from (variants, named on the player) one is shown.
 
 The ball and the stage's camera belong to all players together: they follow the takes that are shown just now.
 """
@@ -6,20 +7,23 @@ The ball and the stage's camera belong to all players together: they follow the 
 from __future__ import annotations
 
 import bpy
+import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import channels, linked, session
-from ..core.clock import of_scene
+from ..core import channels, session
+from ..core.measure import scene_clock
 from ..core.set_aside import bring_back, drop, play_as_before, put_aside
 from ..core.settings import BeyondMocapPlayer
 from ..passes import possession
 from ..path_editing import riders
 from ..stage import stage
-from . import bake, blocks, error_curves, hand_keys
+from . import bake, blocks, hand_keys, quality
 from .bake import MARK
 
 STEPS = ("recipe", "made_of")
 LINES = ("take", "quality", "moments", "warnings")
+
+VARIANT_LINES = ("quality", "moments", "warnings", "recipe")
 
 
 def check(player: BeyondMocapPlayer) -> None:
@@ -27,7 +31,7 @@ def check(player: BeyondMocapPlayer) -> None:
     body = player.body
     if body is None:
         return
-    linked.refuse(body)
+    channels.check_local(body)
     override = body.override_library
     if override is not None and override.is_system_override:
         raise InputError(f"body {body.name}", "an override that cannot be edited", "an editable override",
@@ -61,11 +65,11 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
         body = bake.player(context, player, made)
     action, slot = channels.playing(body)
     blocks.note(action, made.take, context.scene)
-    hand_keys.note(action, slot, of_scene(context.scene))
-    moved = hand_keys.shift_between(clock, of_scene(context.scene))
+    hand_keys.note(action, slot, scene_clock(context.scene))
+    moved = hand_keys.shift_between(clock, scene_clock(context.scene))
     result.hand_keys = hand_keys.put(action, slot, hand, moved) if moved is not None else 0
     result.state = "PREVIEW"
-    error_curves.renew(context.scene, player)
+    quality.renew_error_curves(context.scene, player)
     share(context)
     return body
 
@@ -86,6 +90,92 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
     _keep_shared(context)
     _name(context, player)
     return body
+
+
+def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
+    """Take the preview off a player: what was there before is there again, to the last bit."""
+    result, body = player.result, player.body
+    off_path(player)
+    accepted = result.was_accepted
+    if body is not None and body == result.body and result.motion.kept:
+        _undress(context, player)
+        bring_back(result.motion, body, MARK)
+    else:
+        _undress(context, player)
+        if body is not None:
+            quality.remove_error_curves(body)
+            _remove_armature(body)
+        player.body = result.body
+    for name in LINES:
+        setattr(player, name, getattr(result, name))
+    for name in STEPS:
+        setattr(result, name, getattr(result, f"{name}_before"))
+    _settle(player)
+    result.state = "ACCEPTED" if accepted else "NONE"
+    quality.renew_error_curves(context.scene, player)
+    share(context)
+
+
+def shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
+    """Whether the player's result is on a body in the scene."""
+    there = player.body is not None and player.body.name in scene.objects
+    return there and player.result.state != "NONE"
+
+
+def forget(player: BeyondMocapPlayer) -> None:
+    """The preview's body is gone: nothing can be brought back to it."""
+    _settle(player)
+    player.result.state = "NONE"
+
+
+def share(context: bpy.types.Context) -> None:
+    """Let ball and camera follow the takes that are shown; with the last preview what they did before
+    comes back."""
+    _with_free_ball(context, _share_free)
+
+
+class _shared_length:
+    """Notes, for the length of a `with`, by how much a preview lengthens the scene."""
+
+    def __init__(self, scene: bpy.types.Scene):
+        self.scene, self.shared, self.before = scene, scene.beyond_mocap.shared, scene.frame_end
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        if self.scene.frame_end == self.before:
+            return
+        if not self.shared.end_set:
+            self.shared.end_before = self.before
+        self.shared.end_set = self.scene.frame_end
+
+
+def keep_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, str], dict]]) -> None:
+    """Name the takes of (name, lines, report) on the player, if there are several; what was named before goes."""
+    variants = player.result.variants
+    variants.clear()
+    if len(found) < 2:
+        return
+    first = session.made(found[0][0]).take
+    for name, lines, report in found:
+        variant = variants.add()
+        variant.name = name
+        for line in VARIANT_LINES:
+            setattr(variant, line, lines[line])
+        variant.summary = _summary(report, _apart(first, session.made(name).take))
+
+
+def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: int) -> None:
+    """Show variant `number`, from 0; InputError where the session does not have it any more."""
+    variants = player.result.variants
+    if not 0 <= number < len(variants):
+        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "make variants first")
+    variant = variants[number]
+    if session.made(variant.name) is None:
+        found = "not in this session: it was made before the file was opened"
+        raise InputError("variant", found, "variants of this session", "make variants again")
+    show(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 
 def _keep_shared(context: bpy.types.Context) -> None:
@@ -127,48 +217,6 @@ def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
     path = channels.playing(ball)[0] if ball is not None else None
     if path is not None and path.get(MARK):
         path.name = f"{bake.BALL} path"
-
-
-def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
-    """Take the preview off a player: what was there before is there again, to the last bit."""
-    result, body = player.result, player.body
-    off_path(player)
-    accepted = result.was_accepted
-    if body is not None and body == result.body and result.motion.kept:
-        _undress(context, player)
-        bring_back(result.motion, body, MARK)
-    else:
-        _undress(context, player)
-        if body is not None:
-            error_curves.remove(body)
-            _remove_armature(body)
-        player.body = result.body
-    for name in LINES:
-        setattr(player, name, getattr(result, name))
-    for name in STEPS:
-        setattr(result, name, getattr(result, f"{name}_before"))
-    _settle(player)
-    result.state = "ACCEPTED" if accepted else "NONE"
-    error_curves.renew(context.scene, player)
-    share(context)
-
-
-def shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
-    """Whether the player's result is on a body in the scene."""
-    there = player.body is not None and player.body.name in scene.objects
-    return there and player.result.state != "NONE"
-
-
-def forget(player: BeyondMocapPlayer) -> None:
-    """The preview's body is gone: nothing can be brought back to it."""
-    _settle(player)
-    player.result.state = "NONE"
-
-
-def share(context: bpy.types.Context) -> None:
-    """Let ball and camera follow the takes that are shown; with the last preview what they did before
-    comes back."""
-    _with_free_ball(context, _share_free)
 
 
 def _share_free(context: bpy.types.Context) -> None:
@@ -220,23 +268,6 @@ def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
     if shared.end_set and scene.frame_end == shared.end_set:
         scene.frame_end = shared.end_before
     shared.end_set = 0
-
-
-class _shared_length:
-    """Notes, for the length of a `with`, by how much a preview lengthens the scene."""
-
-    def __init__(self, scene: bpy.types.Scene):
-        self.scene, self.shared, self.before = scene, scene.beyond_mocap.shared, scene.frame_end
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        if self.scene.frame_end == self.before:
-            return
-        if not self.shared.end_set:
-            self.shared.end_before = self.before
-        self.shared.end_set = self.scene.frame_end
 
 
 def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: session.Made) -> None:
@@ -312,3 +343,19 @@ def _remove_data(data) -> None:
     unworn = [material for material in materials if not material.users and material.get(MARK)]
     if unworn:
         bpy.data.batch_remove(unworn)
+
+
+def _summary(report: dict, apart: float) -> str:
+    """A take's figures in a few words."""
+    root, slide = report["root_error_m"]["mean"], report["skate"]["contact_cm_s"]
+    words = f"slide {slide:.1f} cm/s" if slide is not None else f"off {100 * root:.1f} cm"
+    jerk = report.get("seam_jerk_ratio", {}).get("median")
+    words += f", seams {jerk:.2f}" if jerk is not None else ""
+    return f"{words}, {apart:.0%} other" if apart else words
+
+
+def _apart(first, other) -> float:
+    """The share of frames at which two takes of one plan show different footage."""
+    same_clip = np.array(first.clips)[first.clip] == np.array(other.clips)[other.clip]
+    same = same_clip & (first.mirrored == other.mirrored) & (np.abs(first.clip_frame - other.clip_frame) < 3.0)
+    return float(1.0 - same.mean())

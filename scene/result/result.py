@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 import bpy
-from bpy.props import (
-    BoolProperty,
-    CollectionProperty,
-    EnumProperty,
-    FloatProperty,
-    IntProperty,
-    PointerProperty,
-    StringProperty,
-)
+from bpy.props import BoolProperty, CollectionProperty, EnumProperty, IntProperty, PointerProperty, StringProperty
 
-STATES = (
-    ("NONE", "None", "Nothing has been made"),
-    ("PREVIEW", "Preview", "A take is shown; Accept keeps it, Discard brings back what was there"),
-    ("ACCEPTED", "Accepted", "A take has been kept"),
-)
+STATES = (("NONE", "None", "Nothing has been made"),
+          ("PREVIEW", "Preview", "A take is shown; Accept keeps it, Discard brings back what was there"),
+          ("ACCEPTED", "Accepted", "A take has been kept"))
 
 
 class BeyondMocapBefore(bpy.types.PropertyGroup):
@@ -29,7 +19,7 @@ class BeyondMocapBefore(bpy.types.PropertyGroup):
     action: PointerProperty(type=bpy.types.Action, description="The action that it played")
     slot: StringProperty(description="The identifier of that action's slot")
     use_nla: BoolProperty(default=True, description="Whether its NLA tracks were played")
-    influence: FloatProperty(default=1.0, description="The influence of its action")
+    influence: bpy.props.FloatProperty(default=1.0, description="The influence of its action")
     blend: StringProperty(default="REPLACE", description="How its action was blended with its NLA tracks")
     extrapolation: StringProperty(default="HOLD", description="What its action did beyond its ends")
     stance: StringProperty(description="How it stood, object and bones, as JSON")

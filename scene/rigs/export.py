@@ -20,8 +20,8 @@ from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.files.whole import beside
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from ..core.aside import scene_aside
 from ..core.measure import frames_per_second, units_per_metre
+from ..core.set_aside import scene_aside
 from . import bone_maps
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}

@@ -44,10 +44,8 @@ def write(ball: bpy.types.Object, path: BallPath, scene: bpy.types.Scene, start:
     at = (frames - start) / fps
     places = interpolate(at, seconds, path.positions)
     group = "Object Transforms"
-    curves = {
-        "location": (group, places * units_per_metre(scene)),
-        "rotation_quaternion": (group, rolling(places) if path.rotations is None else _turned(path, at)),
-    }
+    curves = {"location": (group, places * units_per_metre(scene)),
+              "rotation_quaternion": (group, rolling(places) if path.rotations is None else _turned(path, at))}
     return channels.animate(ball, f"{ball.name} path", frames, curves)
 
 

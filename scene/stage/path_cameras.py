@@ -56,9 +56,8 @@ def route(scene: bpy.types.Scene, first: bpy.types.Object | None = None) -> Rout
         rides.renew(scene, body)
         known[body] = rides.shown(body)
     if not known:
-        raise InputError(
-            "path cameras", "nobody rides a path", "an armature that does", "select one and press Edit Path"
-        )
+        raise InputError("path cameras", "nobody rides a path", "an armature that does",
+                         "select one and press Edit Path")
     places = np.concatenate([part for shown in known.values() for part in (shown.line, shown.ridden.origin)])
     shown = known.get(first) or next(iter(known.values()))
     frames = shown.first + np.arange(len(shown.ridden.origin), dtype=float)
@@ -80,9 +79,8 @@ def set_up(scene: bpy.types.Scene, route: Route) -> list[str]:
             _hang(scene, collection, camera)
         else:
             _frame(scene, camera, kind, corners, _side(route.places))
-        camera.data.clip_end = max(
-            camera.data.clip_end, 4.0 * float(np.ptp(corners, axis=0).max()) * units_per_metre(scene)
-        )
+        camera.data.clip_end = max(camera.data.clip_end,
+                                   4.0 * float(np.ptp(corners, axis=0).max()) * units_per_metre(scene))
         camera[LAID] = _laid(camera)
     follow(scene, route)
     return kept
@@ -109,10 +107,8 @@ def followed(route: Route, fps: float) -> tuple[np.ndarray, np.ndarray]:
     """Place (T, 3) m and turn (T,) of the focus: the body's, smooth enough to look at."""
     step = np.linalg.norm(np.diff(route.origin, axis=0), axis=1)
     starts = np.flatnonzero(step > JUMP) + 1
-    pieces = [
-        (gaussian_smooth(place, SECONDS * fps / 2.0), gaussian_smooth(turn, SECONDS * fps))
-        for place, turn in zip(np.split(route.origin, starts), np.split(np.unwrap(route.heading)[:, None], starts))
-    ]
+    pieces = [(gaussian_smooth(place, SECONDS * fps / 2.0), gaussian_smooth(turn, SECONDS * fps)) for place,
+              turn in zip(np.split(route.origin, starts), np.split(np.unwrap(route.heading)[:, None], starts))]
     return np.concatenate([place for place, _ in pieces]), np.concatenate([turn[:, 0] for _, turn in pieces])
 
 

@@ -1,4 +1,5 @@
-"""Where the players stand: a pitch with its lines, daylight, and a camera that keeps them in view."""
+"""Where the players stand: a pitch of any size that the Laws of the Game allow with grass, lines and goals with nets,
+daylight, and a camera that keeps them in view."""
 
 from __future__ import annotations
 
@@ -6,8 +7,8 @@ import bpy
 import numpy as np
 
 from ..core import channels
+from ..core.material import colour
 from ..core.measure import units_per_metre
-from . import pitch
 
 NAME = "Stage"
 FOCUS = "Stage focus"
@@ -19,6 +20,12 @@ EARLIER = {"Grass", "Lines", "Sun", "Camera", FOCUS}  # what stages of files fro
 HALF_WIDTH = 0.36  # metres to either side that the camera shows with some margin, per metre of its distance
 CAMERA_FROM = (-1.5, -8.5, 1.3)  # metres from the focus: from the touchline, a little above the players' heads
 
+SIZE, LINE_WIDTH = (105.0, 68.0), 0.12  # metres; International Football Association Board, Laws of the Game, Law 1
+GOAL, BAR, POST = 7.32, 2.44, 0.06  # metres between the posts, below the bar, of a post's radius
+ROOF, FLOOR = 0.9, 2.1  # metres that the net reaches back, at the bar and on the ground
+MESH, CORD = 0.15, 0.003  # metres between the net's cords, and half a cord's width
+BEYOND = 6.0  # metres of grass beyond the lines
+
 
 def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collection:
     """A collection "Stage" with pitch, sun and, if wanted, a camera; an older one is taken away first."""
@@ -27,8 +34,8 @@ def create(context: bpy.types.Context, camera: bool = True) -> bpy.types.Collect
     stage = bpy.data.collections.new(NAME)
     scene.collection.children.link(stage)
     units = units_per_metre(scene)
-    pitch.grass(stage, units)
-    pitch.lines(stage, units)
+    lay_grass(stage, units)
+    lay_lines(stage, units)
     sun(stage)
     if camera:
         scene.camera = _camera(stage, units)
@@ -60,24 +67,6 @@ def focus(scene: bpy.types.Scene) -> bpy.types.Object | None:
     return stage.objects.get(FOCUS) if stage else None
 
 
-def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
-    """The collection that `create` has made, by now or in an earlier version."""
-    found = next((one for one in scene.collection.children if one.get(OURS) and one.library is None), None)
-    if found is not None:
-        return found
-    named = scene.collection.children.get(NAME)
-    return named if named is not None and _own(named) else None
-
-
-def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
-    """What `create` has put into a collection."""
-    if stage.get(OURS):
-        return [thing for thing in stage.objects if thing.get(OURS)]
-    named = {thing: thing.name.split(".")[0] for thing in stage.objects}
-    whole = {"Grass", "Lines"} <= set(named.values())
-    return [thing for thing, name in named.items() if whole and name in EARLIER]
-
-
 def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach: np.ndarray) -> None:
     """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
 
@@ -99,24 +88,9 @@ def sun(collection) -> bpy.types.Object:
     """Daylight from above, a little aside."""
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = 2.8, 0.03
-    thing = pitch.place(collection, "Sun", light)
+    thing = place_object(collection, "Sun", light)
     thing.rotation_euler = (0.75, 0.25, 0.5)
     return thing
-
-
-def _camera(stage, units: float) -> bpy.types.Object:
-    focus = pitch.place(stage, FOCUS, None)
-    focus.empty_display_size = 0.5 * units
-    focus.location = (0.0, 0.0, 0.9 * units)
-    data = bpy.data.cameras.new("Camera")
-    data.lens, data.clip_end = 40.0, 1000.0 * units
-    camera = pitch.place(stage, "Camera", data)
-    camera.parent = focus
-    camera.location = [distance * units for distance in CAMERA_FROM]
-    look = camera.constraints.new("TRACK_TO")
-    look.target = focus
-    look.track_axis, look.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
-    return camera
 
 
 def sky() -> bpy.types.World:
@@ -128,3 +102,196 @@ def sky() -> bpy.types.World:
     background.inputs["Color"].default_value = (0.55, 0.68, 0.85, 1.0)
     background.inputs["Strength"].default_value = 1.1
     return world
+
+
+def lay_grass(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
+    """Mown grass in stripes, a little beyond a pitch of `size` (length, width) m."""
+    x, y = (size[0] / 2 + BEYOND) * units, (size[1] / 2 + BEYOND) * units
+    stripes = np.linspace(-x, x, 25)
+    corners = [(a, b, 0.0) for a in stripes for b in (-y, y)]
+    faces = [(2 * i, 2 * i + 2, 2 * i + 3, 2 * i + 1) for i in range(len(stripes) - 1)]
+    mesh = _mesh("Grass", corners, faces)
+    mesh.materials.append(colour("Grass", (0.055, 0.16, 0.035), 0.95))
+    mesh.materials.append(colour("Grass mown", (0.07, 0.195, 0.045), 0.95))
+    mesh.polygons.foreach_set("material_index", np.arange(len(faces), dtype=np.int32) % 2)
+    return place_object(collection, "Grass", mesh)
+
+
+def lay_lines(collection, units: float, size: tuple[float, float] = SIZE) -> bpy.types.Object:
+    """All markings as ribbons a few millimetres above the grass, each a little higher, lest crossings flicker."""
+    corners, faces = [], []
+    for number, stroke in enumerate(_strokes(*size)):
+        height = 0.004 + 0.0004 * number
+        first = len(corners)
+        corners += [((*corner, height)) for corner in _ribbon(np.array(stroke, float))]
+        faces += [(i, i + 1, i + 3, i + 2) for i in range(first, len(corners) - 2, 2)]
+    mesh = _mesh("Lines", np.array(corners) * units, faces)
+    mesh.materials.append(colour("Line white", (0.85, 0.85, 0.85), 0.9))
+    return place_object(collection, "Lines", mesh)
+
+
+def set_goals(collection, units: float, length: float = SIZE[0]) -> list[bpy.types.Object]:
+    """Both goals of a pitch of `length` m, posts and bar with the net behind them, on one mesh each for both."""
+    frame = _tubes(_frame())
+    frame.materials.append(colour("Goal white", (0.9, 0.9, 0.9), 0.35))
+    net = _cords(_net())
+    net.materials.append(colour("Net white", (0.75, 0.75, 0.75), 0.9))
+    made = []
+    for side, turn in (("right", 0.0), ("left", np.pi)):
+        for mesh, name in ((frame, f"Goal {side}"), (net, f"Net {side}")):
+            thing = place_object(collection, name, mesh)
+            thing.location.x = (length / 2 if turn == 0.0 else -length / 2) * units
+            thing.rotation_euler.z = turn
+            thing.scale = (units,) * 3
+            made.append(thing)
+    return made
+
+
+def place_object(collection, name: str, data) -> bpy.types.Object:
+    """An object in `collection` that a click in the view passes through."""
+    thing = bpy.data.objects.new(name, data)
+    thing.hide_select = data is not None and isinstance(data, bpy.types.Mesh)
+    collection.objects.link(thing)
+    return thing
+
+
+def _stage(scene: bpy.types.Scene) -> bpy.types.Collection | None:
+    """The collection that `create` has made, by now or in an earlier version."""
+    found = next((one for one in scene.collection.children if one.get(OURS) and one.library is None), None)
+    if found is not None:
+        return found
+    named = scene.collection.children.get(NAME)
+    return named if named is not None and _own(named) else None
+
+
+def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
+    """What `create` has put into a collection."""
+    if stage.get(OURS):
+        return [thing for thing in stage.objects if thing.get(OURS)]
+    named = {thing: thing.name.split(".")[0] for thing in stage.objects}
+    whole = {"Grass", "Lines"} <= set(named.values())
+    return [thing for thing, name in named.items() if whole and name in EARLIER]
+
+
+def _camera(stage, units: float) -> bpy.types.Object:
+    focus = place_object(stage, FOCUS, None)
+    focus.empty_display_size = 0.5 * units
+    focus.location = (0.0, 0.0, 0.9 * units)
+    data = bpy.data.cameras.new("Camera")
+    data.lens, data.clip_end = 40.0, 1000.0 * units
+    camera = place_object(stage, "Camera", data)
+    camera.parent = focus
+    camera.location = [distance * units for distance in CAMERA_FROM]
+    look = camera.constraints.new("TRACK_TO")
+    look.target = focus
+    look.track_axis, look.up_axis = "TRACK_NEGATIVE_Z", "UP_Y"
+    return camera
+
+
+def _strokes(length: float, width: float) -> list:
+    """The middles of all lines, each a row of points (x, y) in metres."""
+    x, y, spot = length / 2, width / 2, LINE_WIDTH / 2
+    strokes = [_box(-x, -y, x, y), [(0, -y), (0, y)], _arc((0, 0), 9.15, 0, 360), _arc((0, 0), spot, 0, 360)]
+    for side in (-1, 1):
+        goal, mark, inward = side * x, side * (x - 11.0), 180 if side > 0 else 0
+        for half_width, depth in ((20.16, 16.5), (9.16, 5.5)):
+            front = goal - side * depth
+            strokes.append([(goal, half_width), (front, half_width), (front, -half_width), (goal, -half_width)])
+        strokes += [_arc((mark, 0), 9.15, inward - 53, inward + 53), _arc((mark, 0), spot, 0, 360)]
+        for touch in (-1, 1):
+            middle = np.degrees(np.arctan2(-touch, -side))
+            strokes.append(_arc((goal, touch * y), 1.0, middle - 45, middle + 45))
+    return strokes
+
+
+def _ribbon(points: np.ndarray) -> np.ndarray:
+    """Left and right edge, in turn, of a line along points (N, 2), mitred at its corners: (2 N, 2)."""
+    along = np.diff(points, axis=0)
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    closed = np.allclose(points[0], points[-1])
+    before = np.concatenate([along[-1:] if closed else along[:1], along])
+    after = np.concatenate([along, along[:1] if closed else along[-1:]])
+    bisector = before + after
+    across = np.stack([-bisector[:, 1], bisector[:, 0]], axis=1)
+    across /= np.sum(across * np.stack([-before[:, 1], before[:, 0]], axis=1), axis=1, keepdims=True)
+    return np.stack([points + across * LINE_WIDTH / 2, points - across * LINE_WIDTH / 2], axis=1).reshape(-1, 2)
+
+
+def _box(x0, y0, x1, y1):
+    return [(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)]
+
+
+def _arc(centre, radius, start, end):
+    angles = np.radians(np.linspace(start, end, max(8, int((end - start) / 6)) + 1))
+    return [(centre[0] + radius * np.cos(a), centre[1] + radius * np.sin(a)) for a in angles]
+
+
+def _frame() -> list[tuple[np.ndarray, np.ndarray]]:
+    """Posts and bar of the goal at x = 0 that opens towards -x: the ends of their middles, metres."""
+    y, z = GOAL / 2 + POST, BAR + POST
+    ends = [((0, -y, 0), (0, -y, z)), ((0, y, 0), (0, y, z)), ((0, -y - POST, z), (0, y + POST, z))]
+    return [(np.array(a, float), np.array(b, float)) for a, b in ends]
+
+
+def _net() -> list[tuple[np.ndarray, np.ndarray]]:
+    """The net's cords behind that goal, as ends (3,) m: roof, back and both sides."""
+    y, z = GOAL / 2 + POST, BAR
+    roof, floor = np.array([ROOF, 0, z]), np.array([FLOOR, 0, 0])
+    cords = []
+    for across in np.linspace(-y, y, round(2 * y / MESH) + 1):  # from the bar over the roof and down the back
+        shift = np.array([0, across, 0])
+        cords += [(np.array([0, 0, z]) + shift, roof + shift), (roof + shift, floor + shift)]
+    levels = [(share * roof + (1 - share) * np.array([0, 0, z])) for share in np.linspace(0, 1, round(ROOF / MESH) + 1)]
+    slope = np.linalg.norm(floor - roof)
+    levels += [roof + share * (floor - roof) for share in np.linspace(0, 1, round(slope / MESH) + 1)[1:]]
+    cords += [(level + [0, -y, 0], level + [0, y, 0]) for level in levels]
+    for side in (-y, y):
+        for height in np.linspace(0, z, round(z / MESH) + 1):
+            back = FLOOR + (ROOF - FLOOR) * height / z
+            cords.append((np.array([0, side, height]), np.array([back, side, height])))
+        for back in np.arange(MESH, FLOOR - 0.5 * MESH, MESH):
+            top = z if back <= ROOF else z * (FLOOR - back) / (FLOOR - ROOF)
+            cords.append((np.array([back, side, 0.0]), np.array([back, side, top])))
+    return cords
+
+
+def _tubes(ends, sides: int = 12) -> bpy.types.Mesh:
+    """Round tubes of a post's radius between pairs of ends."""
+    corners, faces = [], []
+    angles = 2.0 * np.pi * np.arange(sides) / sides
+    for low, high in ends:
+        first, second = _across(high - low)
+        circle = POST * (np.cos(angles)[:, None] * first + np.sin(angles)[:, None] * second)
+        start = len(corners)
+        corners += [*(low + circle), *(high + circle)]
+        faces += [(start + i, start + (i + 1) % sides, start + sides + (i + 1) % sides, start + sides + i)
+                  for i in range(sides)]
+        faces += [tuple(start + i for i in reversed(range(sides))), tuple(start + sides + i for i in range(sides))]
+    mesh = _mesh("Goal", np.array(corners), faces)
+    mesh.polygons.foreach_set("use_smooth", np.array([len(face) == 4 for face in faces]))
+    return mesh
+
+
+def _cords(ends) -> bpy.types.Mesh:
+    """Thin crossed ribbons between pairs of ends, seen from everywhere."""
+    corners, faces = [], []
+    for low, high in ends:
+        for aside in _across(high - low):
+            start = len(corners)
+            corners += [low - CORD * aside, low + CORD * aside, high + CORD * aside, high - CORD * aside]
+            faces.append(tuple(range(start, start + 4)))
+    return _mesh("Net", np.array(corners), faces)
+
+
+def _across(along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors at right angles to `along` (3,) and to each other."""
+    along = along / np.linalg.norm(along)
+    first = np.cross(along, [0.0, 0.0, 1.0] if abs(along[2]) < 0.9 else [1.0, 0.0, 0.0])
+    first /= np.linalg.norm(first)
+    return first, np.cross(along, first)
+
+
+def _mesh(name: str, corners, faces) -> bpy.types.Mesh:
+    mesh = bpy.data.meshes.new(name)
+    mesh.from_pydata(np.asarray(corners).tolist(), [], faces)
+    return mesh

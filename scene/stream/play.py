@@ -14,7 +14,7 @@ import bpy
 
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.passes.hits import HitMotion
-from ..core import action, background, linked
+from ..core import action, background, channels
 from ..core.live import Watcher
 from ..core.measure import frames_per_second
 from ..passes import make
@@ -182,7 +182,7 @@ def _lay(scene, one: Rally, names: list[str]) -> None:
     rows = {row.name: row for row in scene.beyond_mocap_passes.players}
     if missing := [name for name in names if name not in rows]:
         raise InputError("players", f"{missing[0]} is gone from the list", "the same players", "press Play Live again")
-    linked.refuse(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
+    channels.check_local(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
         played = one.players[name]

@@ -14,9 +14,9 @@ from ...beyond_mocap.files.whole import beside, whole_folder
 from ...beyond_mocap.motion.motion import Motion
 from ...beyond_mocap.motion.track.ball_path import BallPath
 from ..core import action, channels
-from ..core.aside import scene_aside
 from ..core.material import colour
 from ..core.measure import frames_per_second, whole_frames
+from ..core.set_aside import scene_aside
 from ..rigs import armature
 from ..stage import ball, body
 

@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ..core import action, channels, linked, preferences, session
+from ..core import action, channels, preferences, session
 from ..core.measure import frames_per_second
 from ..core.settings import absolute
 from ..passes import possession
@@ -111,7 +111,7 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
 def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """InputError where an armature or its ball cannot be animated here."""
     wish = body.beyond_mocap_throw
-    linked.refuse(body, wish.ball)
+    channels.check_local(body, wish.ball)
     channels.check_free(body)
     override = body.override_library
     if override is not None and override.is_system_override:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import bpy
 import numpy as np
 
-from ..core import action, channels, linked, session
+from ..core import action, channels, session
 from ..core.measure import frames_per_second
 from ..core.set_aside import bring_back, drop, put_aside
 from ..result import bake
@@ -55,7 +55,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
 def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     """The armature plays what it did before, and so does its ball; what was made for the throw goes."""
     wish = body.beyond_mocap_throw
-    linked.refuse(body, wish.flown)
+    channels.check_local(body, wish.flown)
     channels.check_free(body)
     flown.give_back(scene, body)
     played = channels.playing(body)[0]
@@ -69,7 +69,7 @@ def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
 def keep(body: bpy.types.Object) -> None:
     """The throw stays as the armature's own motion, its ball as an object of the user's."""
     wish = body.beyond_mocap_throw
-    linked.refuse(body, wish.flown)
+    channels.check_local(body, wish.flown)
     played = channels.playing(body)[0]
     if played is not None and played.get(MARK):
         for name in (MARK, *BAKED):

@@ -17,10 +17,9 @@ from ...beyond_mocap.annotation.annotating import AddMoment, AddSpan, AtPlayhead
 from ...beyond_mocap.annotation.decision import Held
 from ...beyond_mocap.base.errors import InputError
 from ..core import session
-from ..core.clock import Clock, of_scene
+from ..core.measure import Clock, scene_clock
 from ..core.settings import absolute, active_player
-from ..player import subject
-from . import lanes, lay_strips, word_checks
+from . import lanes, lay_strips, strips, word_checks
 from .lanes import PlacedMoment, PlacedSpan
 
 AT_PLAYHEAD = 0.06
@@ -43,16 +42,16 @@ def held(scene: bpy.types.Scene) -> Held | None:
 
 def name_of(context: bpy.types.Context) -> str:
     """Who is annotated, for the eye; empty where there is nobody."""
-    target, player = subject.subject(context), active_player(context.scene.beyond_mocap)
-    return subject.name_of(target) if target is not None else player.name if player is not None else ""
+    target, player = strips.timeline_subject(context), active_player(context.scene.beyond_mocap)
+    return strips.subject_name(target) if target is not None else player.name if player is not None else ""
 
 
 def now(context: bpy.types.Context) -> Now:
     """The playhead on the clock of who is annotated; InputError where there is nobody."""
-    target = subject.subject(context)
-    if target is None and not subject.can_have(context):
+    target = strips.timeline_subject(context)
+    if target is None and not strips.can_have_timeline(context):
         raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
     ends = [placed.span.end for placed in _asked_spans(target)] + [placed.time for placed in _asked_moments(target)]
     return Now(time, 1.0 / clock.fps, max((end for end in ends if end < time - 0.5 / clock.fps), default=None))
@@ -116,8 +115,8 @@ def _asked_spans(target: bpy.types.Object | None) -> list[PlacedSpan]:
 
 def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
     """A key moment; one that stands on its frame already gets its words."""
-    target = subject.with_lanes(context)
-    clock = subject.clock(context, target)
+    target = strips.subject_with_lanes(context)
+    clock = strips.subject_clock(context, target)
     there = next((moment for moment in _asked_moments(target) if moment.frame == clock.whole(key.time)), None)
     if there is not None:
         lay_strips.change_moment(target, there.strip, there.index, replace(there.key, words=key.words))
@@ -127,17 +126,17 @@ def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
 
 
 def _add_span(context: bpy.types.Context, span: Span) -> str:
-    target = subject.with_lanes(context)
+    target = strips.subject_with_lanes(context)
     asked = [placed.span for placed in _asked_spans(target) if placed.span.words]
     others = [one for one in asked if one.start < span.end - 1e-6 and span.start < one.end - 1e-6]
-    lay_strips.add_span(target, span, subject.clock(context, target))
+    lay_strips.add_span(target, span, strips.subject_clock(context, target))
     over = f"; it overlaps {_spoken(others[0].words)}, shorten one of them" if others else ""
     return f"{_spoken(span.words)} from {span.start:.2f} to {span.end:.2f} s{over}"
 
 
 def _at_playhead(context: bpy.types.Context, what: str) -> Done:
-    target = subject.subject(context)
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    target = strips.timeline_subject(context)
+    clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     found = None if target is None else _found(context, target, clock)
     if what in ("earlier", "later"):
         step = 1 if what == "later" else -1
@@ -189,8 +188,8 @@ def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str
 
 
 def _next_moment(context: bpy.types.Context, step: int) -> str:
-    target = subject.subject(context)
-    clock = of_scene(context.scene) if target is None else subject.clock(context, target)
+    target = strips.timeline_subject(context)
+    clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
     ahead = [moment for moment in _asked_moments(target) if step * (moment.time - time) > 0.75 / clock.fps]
     if not ahead:
@@ -215,7 +214,7 @@ def _next_player(context: bpy.types.Context, step: int) -> str:
         return "no player"
     settings.active_player = min(max(settings.active_player + step, 0), len(settings.players) - 1)
     if context.mode == "OBJECT":
-        subject.show(context, settings.players[settings.active_player])
+        strips.show_player(context, settings.players[settings.active_player])
     return name_of(context)
 
 

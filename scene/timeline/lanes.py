@@ -15,7 +15,7 @@ from bpy.props import StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
+from ..core.measure import Clock, nearest_frame
 from .strip_lines import key_of, recorded_span, span_of
 
 WORDS, MOMENTS, AUTOMATIC = "Words", "Moments", "Automatic"
@@ -25,7 +25,6 @@ class BeyondMocapLanes(bpy.types.PropertyGroup):
     """What an object with annotations knows about all of them."""
 
     attached_to = ("Object.beyond_mocap_lanes",)
-
     clock: StringProperty(name="Clock", description="Start frame, seconds there and frames per second of these strips")
 
 

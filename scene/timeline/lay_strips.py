@@ -10,36 +10,20 @@ import bpy
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
-from .lanes import (
-    AUTOMATIC,
-    MOMENTS,
-    WORDS,
-    PlacedMoment,
-    PlacedSpan,
-    lane_number,
-    marker_frame,
-    moments,
-    placed_span,
-    shows,
-    spans,
-    strip_named,
-    strips,
-    within,
-    written_for,
-)
+from ..core.measure import Clock, nearest_frame
+from . import lanes
+from .lanes import PlacedMoment, PlacedSpan
 from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
 
 
-def write(
-    target: bpy.types.Object, timeline: Timeline, clock: Clock, extent: tuple[float, float] | None = None
-) -> None:
+def write(target: bpy.types.Object, timeline: Timeline, clock: Clock,
+          extent: tuple[float, float] | None = None) -> None:
     """Let the strips say `timeline`, in place of all that they asked for; automatic ones stay.
 
     extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it.
     """
     own(target, clock)
-    for track, strip in list(strips(target)):
+    for track, strip in list(lanes.strips(target)):
         if strip.action.beyond_mocap.kind != "automatic":
             _take_away(track, strip)
     _drop_empty_lanes(target)
@@ -55,9 +39,9 @@ def set_automatic(target: bpy.types.Object, timeline: Timeline, clock: Clock) ->
     """Show what a synthesis put in by itself: those spans of its filled `timeline` that nobody asks for, as muted
     strips in place of the automatic ones before. What was touched of these is asked for and stays."""
     own(target, clock)
-    placed = spans(target)
+    placed = lanes.spans(target)
     old = {one.strip for one in placed if one.automatic}
-    for track, strip in list(strips(target)):
+    for track, strip in list(lanes.strips(target)):
         if strip.name in old:
             _take_away(track, strip)
     asked = {one.span for one in placed if not one.automatic and not one.off}
@@ -85,23 +69,23 @@ def add_moment(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> Placed
 def remove_span(target: bpy.types.Object, strip_name: str) -> None:
     """Take a span's strip away."""
     check_editable(target)
-    track = next(track for track, strip in strips(target) if strip.name == strip_name)
-    _take_away(track, strip_named(target, strip_name))
+    track = next(track for track, strip in lanes.strips(target) if strip.name == strip_name)
+    _take_away(track, lanes.strip_named(target, strip_name))
 
 
 def remove_moment(target: bpy.types.Object, strip_name: str, index: int) -> None:
     """Take a key moment's marker away."""
     check_editable(target)
-    markers = strip_named(target, strip_name).action.pose_markers
+    markers = lanes.strip_named(target, strip_name).action.pose_markers
     markers.remove(markers[index])
 
 
 def change_span(target: bpy.types.Object, strip_name: str, span: Span) -> PlacedSpan:
     """Let a span say something else or be at another time; an automatic one becomes one that is asked for."""
     check_editable(target)
-    strip, clock = strip_named(target, strip_name), written_for(target)
+    strip, clock = lanes.strip_named(target, strip_name), lanes.written_for(target)
     off = strip.mute and strip.action.beyond_mocap.kind == "span"
-    selected, inner = strip.select, [placed for placed in moments(target) if placed.strip == strip_name]
+    selected, inner = strip.select, [placed for placed in lanes.moments(target) if placed.strip == strip_name]
     remove_span(target, strip_name)
     laid = _lay(target, span, clock, "span")
     laid.mute, laid.select = off, selected
@@ -113,7 +97,7 @@ def change_span(target: bpy.types.Object, strip_name: str, span: Span) -> Placed
 def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: KeyMoment) -> PlacedMoment:
     """Let a key moment say something else or be at another time; it is picked."""
     check_editable(target)
-    clock, strip = written_for(target), strip_named(target, strip_name)
+    clock, strip = lanes.written_for(target), lanes.strip_named(target, strip_name)
     frame = clock.whole(key.time)
     if not strip.frame_start <= frame <= strip.frame_end:
         remove_moment(target, strip_name, index)
@@ -126,7 +110,7 @@ def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: Ke
 def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
     """Let this key moment be the only picked one; an empty name picks none."""
     check_editable(target)
-    for _, strip in strips(target):
+    for _, strip in lanes.strips(target):
         markers = strip.action.pose_markers
         for number, marker in enumerate(markers):
             marker.select = strip.name == strip_name and number == index
@@ -136,16 +120,16 @@ def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
 
 def relay(target: bpy.types.Object, clock: Clock) -> bool:
     """Lay the strips for another clock, each on the frames of its exact seconds; whether there was anything to do."""
-    old = written_for(target)
+    old = lanes.written_for(target)
     if old is None or old == clock:
         return False
     check_editable(target)
-    said = {strip.name: span_of(strip, old, target.name) for _, strip in strips(target)}
-    keys = [(strip, marker, key_of(marker, marker_frame(strip, marker), old, target.name))
-            for _, strip in strips(target) for marker in strip.action.pose_markers if shows(strip, marker)]
+    said = {strip.name: span_of(strip, old, target.name) for _, strip in lanes.strips(target)}
+    keys = [(strip, marker, key_of(marker, lanes.marker_frame(strip, marker), old, target.name))
+            for _, strip in lanes.strips(target) for marker in strip.action.pose_markers if lanes.shows(strip, marker)]
     for track in target.animation_data.nla_tracks:
         place_all([(strip, *frames_of(said[strip.name], clock)) for strip in track.strips if strip.name in said])
-    for _, strip in strips(target):
+    for _, strip in lanes.strips(target):
         if strip.action.beyond_mocap.kind != "moments":
             remember(strip, said[strip.name], strip.action.beyond_mocap.kind)
     for strip, marker, key in keys:
@@ -164,7 +148,7 @@ def own(target: bpy.types.Object, clock: Clock) -> None:
     relay(target, clock)
     target.beyond_mocap_lanes.clock = clock.spelled()
     tracks = target.animation_data.nla_tracks
-    for name in (AUTOMATIC, WORDS, MOMENTS):  # from bottom to top
+    for name in (lanes.AUTOMATIC, lanes.WORDS, lanes.MOMENTS):  # from bottom to top
         if name not in tracks:
             tracks.new().name = name
 
@@ -187,7 +171,7 @@ def place(strip: bpy.types.NlaStrip, first: float, last: float) -> None:
 
 def _lay(target: bpy.types.Object, span: Span, clock: Clock, kind: str) -> bpy.types.NlaStrip:
     first, last = frames_of(span, clock)
-    lane = lane_with_room(target, AUTOMATIC if kind == "automatic" else WORDS, first, last)
+    lane = lane_with_room(target, lanes.AUTOMATIC if kind == "automatic" else lanes.WORDS, first, last)
     strip = _new_strip(lane, f"{target.name} {words_of(span)}", first, last)
     remember(strip, span, kind)
     strip.mute = kind == "automatic"
@@ -206,7 +190,8 @@ def _new_strip(track: bpy.types.NlaTrack, name: str, first: int, last: int) -> b
 def lane_with_room(target: bpy.types.Object, name: str, first: int, last: int) -> bpy.types.NlaTrack:
     """The first track of that lane with room from first to last, made where there is none."""
     tracks = target.animation_data.nla_tracks
-    fitting = [track for track in tracks if (lane_number(track) if name == WORDS else track.name.startswith(name))]
+    words = name == lanes.WORDS
+    fitting = [track for track in tracks if (lanes.lane_number(track) if words else track.name.startswith(name))]
     for track in fitting:
         if not track.mute and all(last <= strip.frame_start or strip.frame_end <= first for strip in track.strips):
             return track
@@ -229,11 +214,11 @@ def _mark(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> tuple[bpy.t
 
 def _moments_strip(target: bpy.types.Object, first: int, last: int) -> bpy.types.NlaStrip:
     """The strip of key moments that goes from first to last: made, or the nearest one lengthened."""
-    own_strips = [strip for _, strip in strips(target) if strip.action.beyond_mocap.kind == "moments"]
+    own_strips = [strip for _, strip in lanes.strips(target) if strip.action.beyond_mocap.kind == "moments"]
     if not own_strips:
-        track = target.animation_data.nla_tracks[MOMENTS]
-        strip = _new_strip(track, MOMENTS, first, max(last, first + 1))
-        strip.action.name = f"{target.name} {MOMENTS}"
+        track = target.animation_data.nla_tracks[lanes.MOMENTS]
+        strip = _new_strip(track, lanes.MOMENTS, first, max(last, first + 1))
+        strip.action.name = f"{target.name} {lanes.MOMENTS}"
         strip.action.beyond_mocap.kind = "moments"
         return strip
     strip = min(own_strips, key=lambda one: max(one.frame_start - first, last - one.frame_end, 0.0))
@@ -270,8 +255,8 @@ def place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
 
 def _take_away(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip) -> None:
     """Remove a strip (or the meta strip that holds it) and its action, where nobody else plays that."""
-    top = next(top for top in track.strips if strip in list(within(top)))
-    actions = {inner.action for inner in within(top)}
+    top = next(top for top in track.strips if strip in list(lanes.within(top)))
+    actions = {inner.action for inner in lanes.within(top)}
     track.strips.remove(top)
     for action in actions:
         if action is not None and action.users == 0:
@@ -281,7 +266,7 @@ def _take_away(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip) -> None:
 def _drop_empty_lanes(target: bpy.types.Object) -> None:
     tracks = target.animation_data.nla_tracks
     for track in list(tracks):
-        if lane_number(track) > 1 and not track.strips:
+        if lanes.lane_number(track) > 1 and not track.strips:
             tracks.remove(track)
 
 
@@ -292,10 +277,10 @@ def _ends(timeline: Timeline, clock: Clock) -> tuple[float, float]:
 
 
 def _select_only(target: bpy.types.Object, strip_name: str) -> None:
-    for _, strip in strips(target):
+    for _, strip in lanes.strips(target):
         strip.select = strip.name == strip_name
 
 
 def _placed(target: bpy.types.Object, strip_name: str) -> PlacedSpan:
-    track = next(track for track, strip in strips(target) if strip.name == strip_name)
-    return placed_span(track, strip_named(target, strip_name), written_for(target), target.name)
+    track = next(track for track, strip in lanes.strips(target) if strip.name == strip_name)
+    return lanes.placed_span(track, lanes.strip_named(target, strip_name), lanes.written_for(target), target.name)

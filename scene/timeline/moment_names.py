@@ -11,8 +11,8 @@ import bpy
 
 from ..core import window
 from ..core.live import Watcher
-from ..player.subject import subject
 from . import lanes
+from .strips import timeline_subject
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
 BOTTOM, TOP = 24, 26  # points that stay free for the scroll bar and the frame numbers
@@ -113,7 +113,7 @@ def _moments(context: bpy.types.Context):
     """(text, (object, strip, index, frame, picked, off)) of the key moments of the active player and of selected dots;
     names as they are written, since drawing has no time to read words."""
     chosen = {target.name: target for target in context.selected_objects if lanes.has(target)}
-    meant = subject(context)
+    meant = timeline_subject(context)
     if meant is not None:
         chosen[meant.name] = meant
     for target in chosen.values():

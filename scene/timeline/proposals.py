@@ -15,8 +15,8 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, IntProper
 
 from ...beyond_mocap.annotation import ClipAnnotation, Timeline
 from ...beyond_mocap.base.errors import InputError
+from ..library.recordings import RATE
 from . import lanes, lay_strips
-from .clip_annotation import RATE
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.proposal import Proposal
@@ -25,11 +25,9 @@ if TYPE_CHECKING:
 SAME = 0.1
 """Seconds within which two key moments are the same one."""
 
-STATES = (
-    ("OPEN", "Open", "Nobody has looked at it yet"),
-    ("ACCEPTED", "Accepted", "It is among the clip's words"),
-    ("REFUSED", "Refused", "It is not what the clip shows"),
-)
+STATES = (("OPEN", "Open", "Nobody has looked at it yet"),
+          ("ACCEPTED", "Accepted", "It is among the clip's words"),
+          ("REFUSED", "Refused", "It is not what the clip shows"))
 
 
 def _go(group, context):
@@ -56,7 +54,6 @@ class BeyondMocapProposals(bpy.types.PropertyGroup):
     """What was proposed for the clip that an armature shows."""
 
     attached_to = ("Object.beyond_mocap_proposals",)
-
     listed: CollectionProperty(type=BeyondMocapProposal, description="By their first frame")
     active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal that is looked at")
 
@@ -74,9 +71,8 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
     group.active = first if first < len(group.listed) else 0
 
 
-def add(
-    target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str, why: str = ""
-) -> None:
+def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
+        why: str = "") -> None:
     """List one more."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why

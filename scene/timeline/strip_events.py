@@ -12,8 +12,8 @@ import bpy
 
 from ...beyond_mocap.annotation import Span
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, of_scene
 from ..core.live import Watcher, is_running, soon
+from ..core.measure import Clock, scene_clock
 from ..player import dots
 from . import moment_names, word_checks
 from .lanes import AUTOMATIC, WORDS, has, is_lane, marker_frame, shows, strips, written_for
@@ -27,7 +27,7 @@ UNDER_WAY = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_", "MARKER_OT_")
 def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
     """All strips of the scene; those of players are laid anew where the scene's clock has changed. Whether anything
     was to be done. only: names of the objects that may have changed; all where None."""
-    clock, changed = of_scene(scene), False
+    clock, changed = scene_clock(scene), False
     for player in scene.beyond_mocap.players:
         if player.dot is not None and _ours_to_change(player.dot):
             changed |= dots.relay(player.dot, clock) | _onto_clock(player.dot, clock)
@@ -249,7 +249,7 @@ def _changed(_scene, depsgraph) -> None:
 
 def _other_clock(scene: bpy.types.Scene) -> bool:
     """Whether a player's strips stand on the frames of another clock than the scene's."""
-    clock = of_scene(scene).spelled()
+    clock = scene_clock(scene).spelled()
     return any(player.dot is not None and player.dot.beyond_mocap_lanes.clock not in ("", clock)
                for player in scene.beyond_mocap.players)
 

@@ -16,16 +16,14 @@ from bpy.props import EnumProperty, StringProperty
 
 from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline, parse_timeline
 from ...beyond_mocap.base.errors import InputError
-from ..core.clock import Clock, nearest_frame
+from ..core.measure import Clock, nearest_frame
 
 NO_WORDS = "(automatic)"  # the name of a span that says nothing: a strip's name cannot be empty
-KINDS = (
-    ("none", "None", "Nothing of a timeline"),
-    ("span", "Span", "A stretch that is asked for"),
-    ("automatic", "Automatic", "A stretch that a synthesis put in"),
-    ("moments", "Moments", "The lane of key moments"),
-    ("moment", "Moment", "A key moment"),
-)
+KINDS = (("none", "None", "Nothing of a timeline"),
+         ("span", "Span", "A stretch that is asked for"),
+         ("automatic", "Automatic", "A stretch that a synthesis put in"),
+         ("moments", "Moments", "The lane of key moments"),
+         ("moment", "Moment", "A key moment"))
 KEPT = 8192  # lines that are remembered as read: all of a match, since strips are read after every edit
 _MOST_BLANKS = 24
 _NEAR = 1.0 - 1e-3  # frames; what was moved by less still stands where its line says
@@ -35,7 +33,6 @@ class BeyondMocapLine(bpy.types.PropertyGroup):
     """What an action or a marker was written for. Times are text: Blender's own numbers are too coarse for them."""
 
     attached_to = ("Action.beyond_mocap", "TimelineMarker.beyond_mocap")
-
     kind: EnumProperty(name="Kind", items=KINDS, description="What this stands for in a timeline")
     line: StringProperty(name="Line", description="The exact line of the text form, in seconds")
     shown: StringProperty(name="Shown", description="The name that Blender gave it then; another one means new words")

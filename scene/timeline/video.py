@@ -39,10 +39,8 @@ class BeyondMocapVideo(bpy.types.PropertyGroup):
         name="Begins At", default=0.0, unit="TIME_ABSOLUTE", precision=3, step=4, update=renew,
         description="Second on the track's clock at which the video begins; drag or type until both show the same",
     )
-    rate: FloatProperty(
-        name="Frames per Second", default=25.0, min=0.1, max=1000.0, precision=3, update=renew,
-        description="Of the video; a movie file says it itself, an image sequence does not",
-    )
+    rate: FloatProperty(name="Frames per Second", default=25.0, min=0.1, max=1000.0, precision=3, update=renew,
+                        description="Of the video; a movie file says it itself, an image sequence does not")
 
 
 def load(path: str) -> bpy.types.MovieClip:

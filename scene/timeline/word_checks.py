@@ -10,9 +10,9 @@ from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, missing_keys, 
 from ...beyond_mocap.base.errors import InputError
 from ..core import session
 from ..core.settings import absolute
-from ..player.subject import name_of
 from . import lanes
 from .strip_lines import KEPT, base_name, key_of, span_of
+from .strips import subject_name
 
 
 class BeyondMocapProblem(bpy.types.PropertyGroup):
@@ -27,10 +27,8 @@ class BeyondMocapProblems(bpy.types.PropertyGroup):
     """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
 
     attached_to = ("WindowManager.beyond_mocap_problems",)
-
-    lines: bpy.props.CollectionProperty(
-        name="Problems", type=BeyondMocapProblem, description="Everything that was found when words last changed"
-    )
+    lines: bpy.props.CollectionProperty(name="Problems", type=BeyondMocapProblem,
+                                        description="Everything that was found when words last changed")
 
 
 def built(scene: bpy.types.Scene):
@@ -53,7 +51,7 @@ def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True
 def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
     """(frame, line) for everything that is wrong with an object's strips, in time order."""
     found, timeline, asked = [], [], bool(target.beyond_mocap_dot.player)
-    clock, where = lanes.written_for(target), name_of(target)
+    clock, where = lanes.written_for(target), subject_name(target)
     for track, strip in lanes.strips(target):
         if strip.mute or track.mute:
             continue

@@ -23,11 +23,11 @@ def test_three_buttons(extension, tmp_path):
     assert len(paths) == 7 and all(path.startswith("//") for path in paths)
     rooms = {
         name: importlib.import_module(f"{extension.__name__}.scene.{name}")
-        for name in ("result.plans", "timeline.strips", "player.tracks")
+        for name in ("timeline.strips", "player.tracks")
     }
     for player in settings.players:
         track = rooms["player.tracks"].read_track(settings, player)
-        on_disk = rooms["result.plans"].written_words(player, settings.rate, track)
+        on_disk = rooms["timeline.strips"].written_words(player, settings.rate, track)
         asked = rooms["timeline.strips"].read(player, bpy.context.scene)
         assert (asked.spans, asked.keys) == (on_disk.spans, on_disk.keys), "run sample_blend/make_quickstart.py again"
     assert bpy.ops.beyond_mocap.build_library() == {"FINISHED"}

@@ -42,7 +42,7 @@ def type_keys(text):
 def at(second):
     """Put the playhead on a second of the clock."""
     scene = bpy.context.scene
-    scene.frame_current = scene_module("core.clock").of_scene(scene).whole(second)
+    scene.frame_current = scene_module("core.measure").scene_clock(scene).whole(second)
     yield 0.1
 
 
@@ -122,7 +122,7 @@ def check_the_time_is_that_of_the_first_key_while_it_plays():
     last = scene.frame_current
     yield from window.press("SPACE")
     yield from until(lambda: said()[1], 60.0)
-    frame = scene_module("core.clock").of_scene(scene).whole(said()[1][0][0])
+    frame = scene_module("core.measure").scene_clock(scene).whole(said()[1][0][0])
     assert before <= frame <= first, f"at frame {frame}, not in {before} to {first}; played on to {last}"
     yield from end()
 

@@ -140,7 +140,7 @@ def check_the_panel_is_quick():
 def check_figures_come_when_the_curve_is_at_rest():
     yield from a_rider()
     yield from until(lambda: "skate" in rider().beyond_mocap_ride.figures)
-    told = room("panels.figure_lines").lines(rider().beyond_mocap_ride.figures)
+    told = room("panels.path_editing").figure_lines(rider().beyond_mocap_ride.figures)
     output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
     assert "Feet slide" in told and "Off the path" in told
 

@@ -95,10 +95,10 @@ is."""
     busy += [work for work in (manager.beyond_mocap_work.kind, manager.beyond_mocap_work.waiting) if work]
     live = [f"scene.{name}.live" for name in ("path_editing", "ball", "passes")]
     busy += [name for name in live if room(name).WATCHER.dirty]
-    busy += ["scene.result.live"] if settings().live and room("scene.result.live").WATCHER.dirty else []
+    busy += ["scene.result.freshness"] if settings().live and room("scene.result.freshness").LIVE.dirty else []
     thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
     busy += ["scene.throws.live"] if thrown and room("scene.throws.live").WATCHER.dirty else []
-    waits = room("scene.core.live").is_waiting(room("scene.timeline.strip_events")._later)
+    waits = room("scene.timeline.strip_events")._later in room("scene.core.live")._timers
     return busy + ["scene.timeline.strip_events"] * waits
 
 

@@ -196,8 +196,7 @@ def name_at(text):
 
 def picked():
     """The words of the picked key moment."""
-    scene = bpy.context.scene
-    moments = room("scene.timeline.strips").moments(scene.beyond_mocap.players[0], scene)
+    moments = room("scene.timeline.lanes").moments(bpy.context.scene.beyond_mocap.players[0].dot)
     moment = next((moment for moment in moments if moment.selected), None)
     return " ".join(moment.words) if moment else ""
 

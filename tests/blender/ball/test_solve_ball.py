@@ -63,7 +63,7 @@ def test_the_ball_is_where_the_samples_have_it(match):
     press(bpy.ops.beyond_mocap.solve_ball)
     table = np.genfromtxt(MATCH / "player1.csv", delimiter=",", names=True)
     ball, off = bpy.data.objects["Solved Ball"], []
-    clock = importlib.import_module(f"{EXTENSION}.scene.core.clock").of_scene(match)
+    clock = importlib.import_module(f"{EXTENSION}.scene.core.measure").scene_clock(match)
     for row in table[:: len(table) // 20]:
         frame = clock.frame(row["time_s"])
         match.frame_set(int(np.floor(frame)), subframe=frame - np.floor(frame))

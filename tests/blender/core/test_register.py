@@ -115,6 +115,23 @@ def test_a_registration_error_is_passed_on_and_undone(extension, monkeypatch):
     assert our_classes() == before
 
 
+def test_a_scene_that_cannot_watch_is_not_registered(extension, monkeypatch):
+    before, scene = our_classes(), sys.modules[f"{extension.__name__}.scene"]
+    live = sys.modules[f"{extension.__name__}.scene.core.live"]
+    extension.unregister()
+
+    def broken(*_):
+        raise RuntimeError("planted")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(live.Watcher, "draws", property(broken), raising=False)
+        with pytest.raises(RuntimeError, match="planted"):
+            scene.register()
+    assert our_classes() == [] and not hasattr(bpy.types.Scene, "beyond_mocap") and not live._handlers
+    extension.register()
+    assert our_classes() == before
+
+
 def test_the_core_has_one_name():
     with pytest.raises(ImportError):
         import beyond_mocap  # noqa: F401

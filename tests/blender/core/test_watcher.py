@@ -87,6 +87,49 @@ def test_what_raises_is_reported_once_and_the_next_look_comes(live, capsys):
     assert bpy.context.window_manager.beyond_mocap_work.trouble == ""
 
 
+@pytest.mark.parametrize("does", [
+    {"look": "act"}, {"settle": "act"}, {"follow": "act"}, {"saving": "act"},
+])
+def test_what_has_failed_is_said_until_it_succeeds(live, does):
+    fails, work = [True, False], bpy.context.window_manager.beyond_mocap_work
+
+    def act(*_):
+        if fails.pop(0):
+            raise ValueError("planted trouble")
+        return 1.0
+
+    what, = does
+    watcher = planted(live, changed=lambda *_: None, **{what: act})
+
+    def again():
+        if what == "saving":
+            watcher.hear(what)
+            return
+        watcher.mark()
+        watcher.since -= live.RESTED
+        watcher.tick()
+
+    again()
+    assert work.trouble == "Planted has failed; see the system console"
+    live.guard("Another", lambda: None)
+    if what in ("settle", "follow"):
+        watcher.tick()  # there is nothing to do
+        watcher.hear("changed", None, None)
+    assert work.trouble == "Planted has failed; see the system console" and len(fails) == 1
+    again()
+    assert work.trouble == "" and not fails
+
+
+def test_what_could_not_be_updated_is_said_until_it_can(live):
+    told, work = [], bpy.context.window_manager.beyond_mocap_work
+    live.attempt(lambda: 1 / 0, told.append, "Ann: could not be updated")
+    assert told == [work.trouble] == ["Ann: could not be updated; see the system console"]
+    live.attempt(lambda: None, told.append, "Ben: could not be updated")
+    assert work.trouble == told[0]
+    assert live.attempt(lambda: 7, told.append, "Ann: could not be updated") == 7
+    assert work.trouble == "" and len(told) == 1
+
+
 def test_a_wish_of_meanwhile_is_not_lost(live):
     """What is marked while it settles is looked at again; what rests is not."""
     answers = [True, False]
@@ -128,7 +171,7 @@ def test_what_is_to_come_soon_comes_once_and_as_often_as_it_asks(live, windowed)
     newer = live._timers.pop(action)
     bpy.app.timers.unregister(call)
     bpy.app.timers.unregister(newer)
-    assert not live.is_waiting(action)
+    assert action not in live._timers
 
 
 def rider(room):

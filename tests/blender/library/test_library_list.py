@@ -11,7 +11,7 @@ from undo import assert_one_step, state
 
 @pytest.fixture
 def rooms(extension):
-    names = ("library.clips", "library.watch", "library.recordings", "rigs.armature", "core.action", "core.session")
+    names = ("library.clips", "library.recordings", "rigs.armature", "core.action", "core.session")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -134,7 +134,7 @@ def test_the_list_is_not_saved_with_the_file(listed, tmp_path):
 
 
 def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
-    look, news = rooms["library.watch"].look, rooms["library.watch"].news
+    look, news = rooms["library.clips"].list_files, rooms["library.clips"].tell_news
     before = look(str(folder))
     assert sorted(before) == ["kicks/low.bvh", "kicks/low.txt", "other.bvh", "walk.bvh", "walk.txt"]
     assert news(before, before) == ""
@@ -147,15 +147,15 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
 
 
 def test_watching_says_it_and_builds_nothing(listed, folder, rooms, core):
-    watch, settings = rooms["library.watch"], bpy.context.scene.beyond_mocap
+    watch, settings = rooms["library.clips"], bpy.context.scene.beyond_mocap
     assert not settings.library_watch
     core("files.bvh.bvh").write(folder / "new.bvh", made.motion(core, 20))
-    watch._tick()
-    assert listed.news == "" and not watch._look
+    watch._look_again()
+    assert listed.news == "" and not watch._looking
     settings.library_watch = True
-    watch._tick()
-    watch._look["thread"].join()
-    watch._tick()
+    watch._look_again()
+    watch._looking["thread"].join()
+    watch._look_again()
     assert listed.news == "1 new clip" and listed.total == 3
     bpy.ops.beyond_mocap.list_clips()
     assert listed.news == "" and listed.total == 4

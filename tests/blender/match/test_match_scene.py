@@ -36,7 +36,7 @@ def walk(core):
 @pytest.fixture
 def scenery(room, core, walk):
     """Three players, of whom one comes a second and a half late, a referee, and a ball."""
-    person = room("people").Person
+    person = room("load").Person
     people = (
         person("h1", "Ada", 1, "home", True, ((START, walk(-40.0, 0.0)),)),
         person("h10", "Dan", 10, "home", False, ((START, walk(0.0, -3.0)),)),
@@ -47,7 +47,7 @@ def scenery(room, core, walk):
     places = np.column_stack([10.0 * (times - START), np.zeros(len(times)), np.full(len(times), 0.11)])
     ball = core("synthesis.take").BallPath(times, places, np.ones(len(times), bool))
     colours = {"home": "#FFFFFF", "away": "#0000FF"}
-    return room("people").Scenery(START, START + 6.0, 100.0, 64.0, colours, people, ball)
+    return room("load").Scenery(START, START + 6.0, 100.0, 64.0, colours, people, ball)
 
 
 def shown(room, scenery, first=11, fps=(FPS, 1.0)):
@@ -374,12 +374,12 @@ def test_a_gaze_turns_to_the_ball_as_far_as_eyes_turn(room, walk):
 
 @pytest.mark.parametrize("size", [(105.0, 68.0), (90.0, 45.0)])
 def test_lines_and_goals_fit_the_pitch(size):
-    pitch = importlib.import_module(f"{EXTENSION}.scene.stage.pitch")
+    pitch = importlib.import_module(f"{EXTENSION}.scene.stage.stage")
     home = bpy.context.scene.collection
-    lines = pitch.lines(home, 1.0, size)
+    lines = pitch.lay_lines(home, 1.0, size)
     far = np.array([vertex.co for vertex in lines.data.vertices])
     assert np.allclose(np.abs(far[:, :2]).max(axis=0), np.array(size) / 2.0 + 0.06, atol=0.011)
-    made = pitch.goals(home, 1.0, size[0])
+    made = pitch.set_goals(home, 1.0, size[0])
     bpy.context.view_layer.update()
     for goal in made:
         corners = np.array([goal.matrix_world @ vertex.co for vertex in goal.data.vertices])
@@ -389,7 +389,7 @@ def test_lines_and_goals_fit_the_pitch(size):
 
 
 def test_kits_tell_teams_and_keepers_apart(room):
-    kits, person = room("kits"), room("people").Person
+    kits, person = room("kits"), room("load").Person
     for colours in ({}, {"home": "#F2C200", "away": "#1FA34A"}, {"home": "#FFFFFF", "away": "#101010"}):
         worn = [kits.kit_of(person("", "", 1, team, keeper, ()), colours).shirt
                 for team in ("home", "away") for keeper in (False, True)]

@@ -146,8 +146,8 @@ def test_what_is_drawn_follows_the_body(shown, room, scale):
     take = room("core.session").made(scene.beyond_mocap.players[0].take).take
     body.location, body.rotation_euler, body.scale = (3.0 / scale, -2.0, 0.0), (0.0, 0.0, 1.1), (1.5, 1.5, 1.5)
     scene.frame_set(31)
-    world = room("overlays.place").take_to_world(scene, body)
-    at = room("overlays.place").seconds_at(scene) - take.start_time
+    world = room("overlays.store").take_to_world(scene, body)
+    at = room("overlays.store").seconds_at(scene) - take.start_time
     bone = body.evaluated_get(bpy.context.evaluated_depsgraph_get()).pose.bones[take.motion.skeleton.names[0]]
     root = [
         np.interp(at * take.motion.fps, np.arange(len(take.motion)), take.motion.root_positions[:, i]) for i in range(3)
@@ -161,7 +161,7 @@ def test_accepted_results_still_know_where_they_lay(shown, room, form):
     body = bpy.context.scene.beyond_mocap.players[0].body
     body.location.x += 2.0
     bpy.context.view_layer.update()
-    assert room("overlays.place").take_to_world(bpy.context.scene, body).translation.x == pytest.approx(2.0, abs=1e-5)
+    assert room("overlays.store").take_to_world(bpy.context.scene, body).translation.x == pytest.approx(2.0, abs=1e-5)
 
 
 def test_lines_of_the_report_keep_their_seconds(shown):
@@ -180,7 +180,7 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
-    lines = room("result.quality").quality(report).splitlines()
+    lines = room("result.quality").quality_lines(report).splitlines()
     assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed",
                      "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
 
@@ -244,9 +244,9 @@ def test_error_curves_go_with_the_take(shown, room):
     first = bpy.context.scene.beyond_mocap.players[0].body.data.animation_data.action.name
     bpy.ops.beyond_mocap.synthesize()  # a preview: the curves are those of the new take
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert room("result.error_curves").there(player.body) and player.body.data.animation_data.action.name == first
+    assert room("result.quality").has_error_curves(player.body) and player.body.data.animation_data.action.name == first
     bpy.ops.beyond_mocap.discard()
-    assert room("result.error_curves").there(bpy.context.scene.beyond_mocap.players[0].body)
+    assert room("result.quality").has_error_curves(bpy.context.scene.beyond_mocap.players[0].body)
     bpy.ops.beyond_mocap.error_curves(remove=True)
     assert {action.name for action in bpy.data.actions} == before
 

@@ -146,7 +146,7 @@ def test_hidden_riders_and_those_not_computed_yet_are_not_drawn(rides, shown, mo
 
 
 def test_figures_become_lines_with_what_is_aimed_for():
-    lines = import_module(f"{EXTENSION}.panels.figure_lines").lines
+    lines = import_module(f"{EXTENSION}.panels.path_editing").figure_lines
     told = lines(json.dumps({
         "root_error_m": {"mean": 0.007}, "root_error_own_m": {"mean": 0.0081}, "kept_speed": {"path": {"p95": 0.02}},
         "skate": {"contact_cm_s": 1.5, "source_contact_cm_s": 2.25, "before_contact_cm_s": 9.0}, "ik_miss_share": None,
@@ -201,4 +201,5 @@ def test_update_path_measures_at_once():
     body = bpy.context.object
     bpy.ops.beyond_mocap.edit_path()
     bpy.ops.beyond_mocap.update_path()
-    assert "Feet slide" in import_module(f"{EXTENSION}.panels.figure_lines").lines(body.beyond_mocap_ride.figures)
+    told = import_module(f"{EXTENSION}.panels.path_editing").figure_lines(body.beyond_mocap_ride.figures)
+    assert "Feet slide" in told

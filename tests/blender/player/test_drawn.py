@@ -163,7 +163,6 @@ def test_what_has_to_be_played_is_left_alone_where_the_scene_must_stand_still(sc
 
 
 def test_live_begins_the_same_wish_once(extension, scene):
-    live = importlib.import_module(f"{extension.__name__}.scene.result.live")
     plans = importlib.import_module(f"{extension.__name__}.scene.result.plans")
     freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
     bpy.ops.beyond_mocap.draw_track()
@@ -171,17 +170,17 @@ def test_live_begins_the_same_wish_once(extension, scene):
     parts = freshness.parts_of_plan(plans.plan_of(scene.beyond_mocap, player)[0])
     player.take, player.result.made_of = "take", json.dumps(parts)
     player.height = 1.9
-    live.WATCHER.mark()
-    now = live.WATCHER.since
+    freshness.LIVE.mark()
+    now = freshness.LIVE.since
     try:
-        assert live.due(scene, now + 0.2) == ("Drawn", "quick")
+        assert freshness.due_update(scene, now + 0.2) == ("Drawn", "quick")
         # it failed, or was cancelled
-        assert [live.due(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
+        assert [freshness.due_update(scene, now + later) for later in (0.3, 0.5, 2.0, 3.0)] == [None] * 4
         player.height = 1.8
-        live.WATCHER.mark()
-        assert live.due(scene, live.WATCHER.since + 0.2) == ("Drawn", "quick")
+        freshness.LIVE.mark()
+        assert freshness.due_update(scene, freshness.LIVE.since + 0.2) == ("Drawn", "quick")
     finally:
-        live.forget()
+        freshness.forget_edits()
 
 
 def test_a_drawn_player_has_a_dot_and_is_one_step(scene):
@@ -242,25 +241,26 @@ def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core
     for name in ("standing_1", "walking_1_2", "jogging_2_9"):
         for suffix in (".bvh", ".txt"):
             (tmp_path / f"{name}{suffix}").symlink_to(sample / f"{name}{suffix}")
-    live = importlib.import_module(f"{extension.__name__}.scene.result.live")
+    freshness = importlib.import_module(f"{extension.__name__}.scene.result.freshness")
     session = importlib.import_module(f"{extension.__name__}.scene.core.session")
     settings = scene.beyond_mocap
     settings.library_folder = str(tmp_path)
     bpy.ops.beyond_mocap.draw_track()
     player = settings.players[0]
-    assert not live.edited(scene, player)  # nothing made yet
+    assert not freshness.edited_parts(scene, player)  # nothing made yet
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     take = session.made(player.take).take
-    assert not live.edited(scene, player)
+    assert not freshness.edited_parts(scene, player)
     player.drawn_track.data.splines[0].bezier_points[1].co.y += 1.0
-    live.WATCHER.mark()
-    assert live.edited(scene, player)
-    now = live.WATCHER.since
-    assert live.due(scene, now + 0.2) == ("Drawn", "quick")
+    freshness.LIVE.mark()
+    assert freshness.edited_parts(scene, player)
+    now = freshness.LIVE.since
+    assert freshness.due_update(scene, now + 0.2) == ("Drawn", "quick")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="quick") == {"FINISHED"}
     quick = session.made(player.take).take
     assert len(quick.motion) != len(take.motion) and any("cut short" in line for line in quick.warnings)
-    assert live.due(scene, now + 0.4) is None and live.due(scene, now + 2.0) == ("Drawn", "whole")
+    assert freshness.due_update(scene, now + 0.4) is None
+    assert freshness.due_update(scene, now + 2.0) == ("Drawn", "whole")
     assert bpy.ops.beyond_mocap.update_live(player="Drawn", kind="whole") == {"FINISHED"}
     assert not any("cut short" in line for line in session.made(player.take).take.warnings)
     scene.frame_set(60)
@@ -268,7 +268,7 @@ def test_a_drawn_player_is_synthesized_updated_and_pinned(extension, scene, core
     target = player.pins[0].target
     target.location.z += 0.2
     bpy.context.view_layer.update()
-    assert live.edited(scene, player)
+    assert freshness.edited_parts(scene, player)
     assert bpy.ops.beyond_mocap.update() == {"FINISHED"}
     made = session.made(player.take).take
     assert made.pins[0].miss < 0.005

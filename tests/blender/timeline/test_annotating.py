@@ -103,7 +103,7 @@ def test_mirror_remove_and_nudge_take_what_is_at_the_playhead(room, players):
 
 def test_a_spans_side_is_mirrored_too(room, players):
     keys("IN", 10.0)
-    room("timeline.strips").add_span(bpy.context, players[0], 9.0, 10.0, ("dribble", "left"))
+    bpy.ops.beyond_mocap.add_span(words="dribble left", start=9.0, end=10.0)
     keys("MIRROR", 9.5)
     assert (9.0, 10.0, "dribble right") in said(room, players[0])[0]
 
@@ -132,7 +132,7 @@ def test_what_has_no_side_cannot_be_mirrored(room, players):
 def test_arrows_go_from_moment_to_moment_and_pick_it(room, players, scene):
     keys("NEXT", 0.0)
     assert scene.frame_current == 126
-    assert [moment.time for moment in room("timeline.strips").moments(players[0], scene) if moment.selected] == [5.0]
+    assert [moment.time for moment in room("timeline.lanes").moments(players[0].dot) if moment.selected] == [5.0]
     keys("NEXT")
     assert scene.frame_current == 201
     keys("NEXT")
@@ -237,7 +237,7 @@ def test_what_the_library_holds_is_known_with_and_without_mirrored_clips(room, s
 def test_a_clip_with_lanes_of_its_own_is_annotated_while_it_is_the_active_object(room, players):
     clip = bpy.data.objects.new("clip", bpy.data.armatures.new("clip"))
     bpy.context.scene.collection.objects.link(clip)
-    clock, core = room("core.clock").Clock(1.0, 0.0, 25.0), import_module(f"{EXTENSION}.beyond_mocap.annotation")
+    clock, core = room("core.measure").Clock(1.0, 0.0, 25.0), import_module(f"{EXTENSION}.beyond_mocap.annotation")
     room("timeline.lay_strips").write(clip, core.Timeline(), clock)
     bpy.context.view_layer.objects.active = clip
     before = said(room, players[0])
@@ -276,11 +276,11 @@ def test_the_part_of_an_editor_that_nothing_lies_over(room):
     others = [region("TOOLS", 100, 200, 60, 300), region("UI", 680, 50, 220, 560), region("HEADER", 100, 624, 800, 26),
               region("FOOTER", 100, 50, 800, 1), region("CHANNELS", 0, 50, 100, 600)]
     area = SimpleNamespace(regions=[main, *others])
-    assert room("core.areas").free_part(area, main) == (64, 4, 576, 570)
-    assert room("core.areas").free_part(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
-    assert room("core.areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]),
+    assert room("core.window").free_region(area, main) == (64, 4, 576, 570)
+    assert room("core.window").free_region(SimpleNamespace(regions=[main]), main) == (4, 4, 796, 596)
+    assert room("core.window").free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 120)]),
                                    main) == (4, 134, 796, 596)
-    assert room("core.areas").free_part(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]),
+    assert room("core.window").free_region(SimpleNamespace(regions=[main, region("HUD", 110, 60, 300, 400)]),
                                    main) == (314, 4, 796, 596)
 
 

@@ -13,7 +13,7 @@ SAMPLE = Path(__file__).resolve().parents[3] / "sample_blend" / "library"
 
 @pytest.fixture
 def rooms(extension):
-    names = ("timeline.clip_annotation", "timeline.lanes", "timeline.lay_strips", "timeline.strips", "core.settings")
+    names = ("library.recordings", "timeline.lanes", "timeline.lay_strips", "timeline.strips", "core.settings")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
@@ -40,8 +40,8 @@ def test_a_clip_is_opened_with_its_words(core, rooms, library, fps, base):
     shutil.copy(SAMPLE / "kick_low_top.txt", library / "kick_low_top.txt")
     assert bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh") == {"FINISHED"}
     rig = bpy.context.object
-    assert rooms["timeline.clip_annotation"].shown(rig) == "kick_low_top.bvh"
-    assert rooms["timeline.clip_annotation"].said(rig) == rows_of(core, library / "kick_low_top.bvh")
+    assert rooms["library.recordings"].shown_clip(rig) == "kick_low_top.bvh"
+    assert rooms["library.recordings"].read_words(rig) == rows_of(core, library / "kick_low_top.bvh")
     assert rig.animation_data.action is not None, "the strips took the motion's place"
     moment = rooms["timeline.lanes"].moments(rig)[0]
     assert moment.frame == round(1 + 156 / 60 * fps / base)
@@ -52,7 +52,7 @@ def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     rig = bpy.context.object
     assert bpy.ops.beyond_mocap.propose_words() == {"FINISHED"}
-    said = rooms["timeline.clip_annotation"].said(rig)
+    said = rooms["library.recordings"].read_words(rig)
     kick = next(row for row in said if row.key is not None)
     assert {"kick", "right"} <= set(kick.words) and abs(kick.key - 156) <= 2
     assert press(bpy.ops.beyond_mocap.save_words) == {"FINISHED"}
@@ -112,13 +112,13 @@ def test_proposals_beside_what_is_there(rooms, library):
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")
     bpy.ops.beyond_mocap.propose_words(least=0.99)
     with pytest.raises(Exception, match="say nothing"):
-        rooms["timeline.clip_annotation"].said(bpy.context.object)
+        rooms["library.recordings"].read_words(bpy.context.object)
     with pytest.raises(RuntimeError, match="say nothing"):
         bpy.ops.beyond_mocap.save_words()
     bpy.ops.beyond_mocap.propose_words()
-    count = len(rooms["timeline.clip_annotation"].said(bpy.context.object))
+    count = len(rooms["library.recordings"].read_words(bpy.context.object))
     bpy.ops.beyond_mocap.propose_words(replace=False)
-    assert len(rooms["timeline.clip_annotation"].said(bpy.context.object)) > count
+    assert len(rooms["library.recordings"].read_words(bpy.context.object)) > count
 
 
 def test_nothing_chosen_or_something_else():
@@ -139,7 +139,7 @@ def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, libra
     words = tmp_path / "words.txt"
     words.write_text("0 1 walking front\n0.5 kick left\n")
     assert_one_step(bpy.ops.beyond_mocap.import_words, directory=str(tmp_path), files=[{"name": "words.txt"}])
-    assert [row.words for row in rooms["timeline.clip_annotation"].said(bpy.context.object)] == [("walking", "front"),
+    assert [row.words for row in rooms["library.recordings"].read_words(bpy.context.object)] == [("walking", "front"),
                                                                                         ("kick", "left")]
     bpy.ops.beyond_mocap.remove_clip()
     track = tmp_path / "player.csv"

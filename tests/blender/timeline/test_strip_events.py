@@ -27,7 +27,7 @@ def dot(room, parse):
     made = bpy.data.objects.new("dot", None)
     bpy.context.scene.collection.objects.link(made)
     timeline = parse("1.013 3.007 running\n3.007 5 walking\n2.222 kick\n4.444 header\n")
-    room("timeline.lay_strips").write(made, timeline, room("core.clock").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
+    room("timeline.lay_strips").write(made, timeline, room("core.measure").Clock(1.0, 0.0, 25.0), (0.0, 8.0))
     return made
 
 
@@ -200,7 +200,7 @@ def test_another_frame_rate_of_the_scene(room, tmp_path, core):
     assert room("timeline.strips").read(player, scene) == before
     assert room("timeline.strip_events").put_in_order(scene)
     assert room("timeline.strips").read(player, scene) == before
-    assert room("timeline.strips").moments(player, scene)[0].frame == round(101 + 6.022 * 24 / 1.001)
+    assert room("timeline.lanes").moments(player.dot)[0].frame == round(101 + 6.022 * 24 / 1.001)
     scene.render.fps = 30
     strip = next(strip for track, strip in room("timeline.lanes").strips(player.dot) if strip.name == "running")
     strip.name = "take 5 #"  # which nobody can read: all of it waits, and says so

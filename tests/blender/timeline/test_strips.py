@@ -31,7 +31,7 @@ def dot():
 
 @pytest.fixture
 def clock(room):
-    return room("core.clock").Clock(1.0, 0.0, 25.0)
+    return room("core.measure").Clock(1.0, 0.0, 25.0)
 
 
 @pytest.fixture
@@ -63,7 +63,7 @@ def random_timeline(core, dice, count=12):
 @pytest.mark.parametrize("seed", range(6))
 def test_there_and_back_to_the_bit(room, core, text, dot, seed):
     dice = np.random.default_rng(seed)
-    clock = room("core.clock").Clock(
+    clock = room("core.measure").Clock(
         float(dice.integers(-100, 100)), dice.uniform(-50, 50), dice.choice([23.976, 24.0, 25.0, 60.0])
     )
     timeline = random_timeline(core, dice)
@@ -79,7 +79,7 @@ def test_there_and_back_to_the_bit(room, core, text, dot, seed):
 @pytest.mark.parametrize("seed", range(3))
 def test_another_clock_lays_the_strips_anew_and_says_the_same(room, core, dot, seed):
     dice = np.random.default_rng(seed)
-    Clock, lanes, lay_strips = room("core.clock").Clock, room("timeline.lanes"), room("timeline.lay_strips")
+    Clock, lanes, lay_strips = room("core.measure").Clock, room("timeline.lanes"), room("timeline.lay_strips")
     timeline = random_timeline(core, dice)
     lay_strips.write(dot, timeline, Clock(1.0, 0.0, 25.0))
     for clock in (Clock(1.0, 0.0, 120.0), Clock(101.0, -3.3, 23.976), Clock(-40.0, 7.0, 10.0), Clock(1.0, 0.0, 25.0)):
@@ -196,10 +196,11 @@ def test_import_tracking_makes_dot_ball_and_strips(room, player):
     plans = room("result.plans")
     assert plans.plan_of(scene.beyond_mocap, player)[0].timeline == asked
     assert plans.words_from(player) == "strips of player1"
-    moment, = strips.moments(player, scene)
+    lanes, lay_strips = room("timeline.lanes"), room("timeline.lay_strips")
+    moment, = lanes.moments(dot)
     assert moment.time == 6.02
-    strips.remove(player, moment)
-    strips.remove(player, strips.span_at(player, scene, 3.0))
+    lay_strips.remove_moment(dot, moment.strip, moment.index)
+    lay_strips.remove_span(dot, lanes.span_at(dot, 3.0).strip)
     assert strips.read(player, scene).spans == () and strips.read(player, scene).keys == ()
 
 

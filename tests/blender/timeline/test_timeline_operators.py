@@ -155,7 +155,7 @@ def test_a_dot_appended_to_another_file(player, asked, tmp_path, room):
     new = bpy.context.scene.beyond_mocap.players[0]
     assert (new.name, new.dot.name) == ("player1", "player1 dot") and pathlib.Path(new.tracking_file).is_file()
     assert asked() == before
-    assert room("timeline.strips").moments(new, bpy.context.scene)[0].frame == round(11 + 6.02 * 60)
+    assert room("timeline.lanes").moments(new.dot)[0].frame == round(11 + 6.02 * 60)
     bpy.context.scene.frame_set(11 + 60)
     assert new.dot.matrix_world.translation.x == pytest.approx(3.0, abs=1e-3)
     refused("appended from another file", ops.player_from_dot)

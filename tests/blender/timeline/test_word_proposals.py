@@ -14,7 +14,7 @@ TAUGHT = ("kick_low_inside", "kick_low_inside_slow", "kick_low_top", "jogging_2_
 
 @pytest.fixture
 def rooms(extension):
-    names = ("timeline.clip_annotation", "timeline.lanes", "timeline.lay_strips", "timeline.proposals")
+    names = ("library.recordings", "timeline.lanes", "timeline.lay_strips", "timeline.proposals")
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}") for name in names}
 
 
