@@ -10,7 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.networks import phase_function
 from beyond_mocap.throws.networks.answers import answered, ends, network_output
 from beyond_mocap.throws.networks.chains import LIMB_OF, Chains
 from beyond_mocap.throws.networks.description import Windows
@@ -20,13 +19,12 @@ from beyond_mocap.throws.networks.limb_reach import bent_limb, hinge_axes
 from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.networks.model import SINGLE, ModelSettings
 from beyond_mocap.throws.networks.network import forward
+from beyond_mocap.throws.networks.phases import weigh_points
 from beyond_mocap.throws.networks.training_set import Steps
 
-from .arrays import ARRAYS
 from .config import TrainingConfig
-from .disturbed import disturbed, drawn
-from .networks import RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
-from .recordings import Recordings, single_steps, step_arrays
+from .networks import ARRAYS, RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
+from .recordings import Recordings, disturbed, drawn, single_steps, step_arrays
 
 DROPPED = (SINGLE, "hip", "body")
 """Networks that are trained with dropout (§7.6)."""
@@ -107,7 +105,7 @@ class Networks:
             self.scales[name] = {
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
-            theta = phase_function.weights(phase, self.settings.points).astype(np.float32)
+            theta = weigh_points(phase, self.settings.points).astype(np.float32)
             alone[name] = ((x - mean_x) / scale_x, y, theta)
             if config.linear_start:
                 parts = [(x, y)]
@@ -207,7 +205,7 @@ class Networks:
             x = network_input(name, self.chains, self.settings, pose, after, window, ARRAYS)
             phase = phase_of(name, self.chains, after, window, self.leg_reach, ARRAYS)
             x = (x - self.scales[name]["input_mean"]) / self.scales[name]["input_scale"]
-            theta = phase_function.weights(phase, self.settings.points, jnp)
+            theta = weigh_points(phase, self.settings.points, jnp)
             y = self._answer(params, name, x, theta, jax.random.fold_in(key, number))
             wanted = network_output(name, self.chains, self.settings, pose, truth, ARRAYS)
             parts[name] = joint_error(y, wanted, self.scales[name]["output_scale"])

@@ -1,4 +1,4 @@
-"""Made touches of the ball on the run: kicks, a trap, a dribble.
+"""Synthetic touches of the ball on the run: kicks, a trap, a dribble; and key poses over time, as all moves use them.
 
 Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the
 touch). Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci
@@ -10,9 +10,10 @@ flung out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import quintic_step
 from ..motion import quaternion
@@ -25,7 +26,6 @@ from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, lift_off_ground
 from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
-from .keyed import envelope, keyed, mixed
 
 LEFT, RIGHT = 0, 1
 
@@ -268,3 +268,34 @@ def dribble(
     ankles[:, RIGHT, 2] += touch * lift_off_ground(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
     posture = posture.changed(ankles=ankles, feet=feet)
     return to_motion(posture.frames(course.asked), neutral)
+
+
+def keyed(rows, times: np.ndarray) -> np.ndarray:
+    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the
+    last."""
+    first, last, curve = _curve(tuple(map(tuple, rows)))
+    return curve(np.clip(times, first, last))
+
+
+def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
+    """`keyed` without corners in the speed: (T, values) behind a Gaussian of `frames` standard deviation."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return gaussian_filter1d(keyed(rows, times), frames, axis=0, mode="nearest")
+
+
+@lru_cache(maxsize=256)
+def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
+    """First and last time and the curve of a table; kept, as a made movement is planned again and again."""
+    table = np.array(rows, dtype=float)
+    return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
+
+
+def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
+    """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
+    return quintic_step((times - begin) / (full - begin)) * (1.0 - quintic_step((times - fade) / (end - fade)))
+
+
+def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    weight = weight.reshape(weight.shape + (1,) * (a.ndim - 1))
+    return a * (1.0 - weight) + b * weight

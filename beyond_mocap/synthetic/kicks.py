@@ -4,7 +4,7 @@ Instants, angles and rates of the instep kick follow Lees and Nolan 1998 (J. Spo
 Ikegami and Sakurai 2002 (Med. Sci. Sports Exerc. 34, 2028-2036) and Kellis and Katis 2007 (J. Sports Sci. Med. 6,
 154-165): an approach of 3 m/s at some 35 degrees, the foot planted beside the ball 0.11 s before the contact, the
 pelvis turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees a second, the
-trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `throws.made_kicks`.
+trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `throws.letting_go`.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, hip_joints, to_motion
 from . import gait_tables as tables
 from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
-from .keyed import keyed_rounded
+from .gestures import LEFT, RIGHT, keyed_rounded
 
 BEFORE, AFTER = 1.5, 1.3
 """Seconds of a hard kick before and after the contact; slower ones take longer."""

@@ -18,8 +18,7 @@ from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps
 from .gait import footsteps, posture_over, with_feet
-from .gestures import LEFT, RIGHT, Gesture
-from .keyed import envelope, keyed, mixed
+from .gestures import LEFT, RIGHT, Gesture, envelope, keyed, mixed
 
 # rows: seconds from the touch, then (hips up, ahead), (list, tilt, turn), spine, arms (flexion, abduction, inward,
 # elbow)

@@ -4,7 +4,8 @@ Instants, angles and rates of the hard overarm throw follow Dillman, Fleisig and
 Ther. 18, 402-408) and Fleisig, Barrentine, Zheng, Escamilla and Andrews 1999 (J. Biomech. 32, 1371-1375): foot down
 0.15 s before release with the upper arm level, pelvis then trunk turning at some 600 and 1200 degrees a second, the arm
 turned out by 170 degrees 0.03 s before release, the elbow at 25 degrees as the ball leaves. A throw is aimed as people
-aim: the body turns to the target, and the ball leaves a little earlier or later in the swing.
+aim: the body turns to the target, and the ball leaves a little earlier or later in the swing. `grip_of` says where a
+hand holds a ball, between the fingers on the palm's side, on any humanoid skeleton.
 """
 
 from __future__ import annotations
@@ -24,9 +25,7 @@ from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
 from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
-from .grip import grip_in
-from .keyed import keyed_rounded
+from .gestures import LEFT, RIGHT, keyed_rounded
 
 GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
@@ -36,6 +35,9 @@ _PLAN = 480.0  # frames a second at which a throw is planned
 _ROUND = 0.007  # s over which corners of the tables are rounded
 _EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball may leave
 _ROUNDS = 12
+_AHEAD, _DOWN = 0.012, 0.105  # metres of an adult whose hand hangs: thumb's side, towards the fingertips
+USUAL_GRIP = 0.036
+"""Metres from the palm's middle to the centre of a baseball; larger balls lie further out by their radius."""
 
 
 @dataclass(frozen=True)
@@ -265,3 +267,21 @@ def _foot(rows: np.ndarray, neutral: Neutral, scale: float) -> np.ndarray:
     up = neutral.ankle_height + raised * scale
     up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
     return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
+
+
+def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:
+    """(3,) m: the centre of a ball of that radius in the axes of the hand joint. InputError for a body without it."""
+    return grip_in(neutral_stance(skeleton), side, radius)
+
+
+def grip_in(neutral: Neutral, side: str, out: float | None = None) -> np.ndarray:
+    """As `grip_of`, of a skeleton whose neutral stance is known; out: m from the palm's middle, None: of an adult's
+    baseball, in the body's size."""
+    hand = getattr(identify(neutral.skeleton), side).hand
+    if hand is None:
+        raise InputError("throw", f"a body without a {side} hand", "a skeleton with arms and hands")
+    size, sign = neutral.leg / tables.LEG, 1.0 if side == "left" else -1.0
+    held = np.array([_AHEAD, -USUAL_GRIP * sign, -_DOWN]) * size
+    if out is not None:
+        held[1] = -sign * max(out, USUAL_GRIP * size)
+    return quaternion.rotate(quaternion.inverse(neutral.rotations[hand]), held)

@@ -20,8 +20,7 @@ from . import gait_tables as tables
 from .course import Course
 from .footsteps import Footsteps, lift_off_ground
 from .gait import thigh_shank, with_feet
-from .gestures import LEFT, RIGHT, Gesture
-from .keyed import envelope, keyed, mixed
+from .gestures import LEFT, RIGHT, Gesture, envelope, keyed, mixed
 from .moves import standing_posture, walked_steps
 
 BEFORE, AFTER = 1.6, 1.9

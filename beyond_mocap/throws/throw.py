@@ -29,12 +29,12 @@ from ..motion.motion import Motion, place
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..motion.track.ball_path import BallPath
-from ..synthetic.grip import grip_of
 from ..synthetic.throws import FASTEST as FASTEST_HAND
+from ..synthetic.throws import grip_of
 from .correction import FINE, LITTLE, Corrected, Freedom, corrected
 from .letting_go import AtFoot, InHand, grip_point, leaving
 from .networks.chains import EFFECTORS
-from .networks.limb_limits import LimbLimits
+from .networks.limits import LimbLimits
 from .networks.model import ThrowModel
 from .networks.plan import Planned, Wish, planned, unlike
 

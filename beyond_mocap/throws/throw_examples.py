@@ -30,7 +30,7 @@ from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from ..synthetic.grip import grip_of
+from ..synthetic.throws import grip_of
 from .networks.chains import EFFECTORS as LIMBS
 from .networks.chains import chains_of
 from .networks.example import Example, example_of, mirrored

@@ -4,12 +4,12 @@ import numpy as np
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.made_kicks import kick
 from beyond_mocap.throws.networks.example import example_of
 from beyond_mocap.throws.networks.limits import learn
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.training_set import leg_reach, training_set
+from beyond_mocap.throws.planted_examples import kick
 
 FAR = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
 
