@@ -93,13 +93,8 @@ class Trained:
 
 
 def fit(
-    problem: Problem,
-    config: TrainingConfig,
-    *,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    minutes: float | None = None,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    problem: Problem, config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
+    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Trained:
     """Trains a problem. checkpoint: where one is written after each macro-epoch and when cancelled. resume: from there.

@@ -45,9 +45,7 @@ def joint_error(y, wanted, scale):
     return jnp.mean(((y - wanted) / scale) ** 2)
 
 
-def effector_error(
-    name: str, chains: Chains, settings: ModelSettings, y, wanted, after: Pose, window: Windows
-):
+def effector_error(name: str, chains: Chains, settings: ModelSettings, y, wanted, after: Pose, window: Windows):
     """The third term of eq. 7.5 without its lambda: mean square distance, m^2.
 
     Of a limb that of its wrist or toe in `after` from where the description has it in frame n + 1; else `missed_ends`.

@@ -41,13 +41,8 @@ READING = 0.05
 
 
 def train(
-    examples: Sequence[Example],
-    config: TrainingConfig,
-    *,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    minutes: float | None = None,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    examples: Sequence[Example], config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
+    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> ThrowModel:
     """A model trained on examples of one skeleton, at the config's rate.
@@ -67,14 +62,10 @@ def train(
 
     def model_of(params: dict, line: str) -> ThrowModel:
         return ThrowModel(
-            settings=settings,
-            skeleton=chains.skeleton,
-            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks},
-            leg_reach=reach,
+            settings=settings, skeleton=chains.skeleton,
+            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks}, leg_reach=reach,
             examples=spread_over(examples, config.examples),
-            stature=float(np.mean([example.stature for example in examples])),
-            joint_limits=limits,
-            reference=reference,
+            stature=float(np.mean([example.stature for example in examples])), joint_limits=limits, reference=reference,
             trained_on=line,
         )
 
@@ -131,9 +122,7 @@ def held_out(examples: Sequence[Example]) -> np.ndarray:
 
 
 def least_astray(
-    problem: Networks,
-    held: Sequence[Example],
-    model_of: Callable[[dict, str], ThrowModel],
+    problem: Networks, held: Sequence[Example], model_of: Callable[[dict, str], ThrowModel],
     cancelled: Callable[[], bool] = lambda: False,
 ) -> float:
     """Of `RIDGES` the one whose networks keep hands and feet nearest to where they are wanted, on movements of which

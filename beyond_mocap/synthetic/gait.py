@@ -38,17 +38,9 @@ _EASE = 0.03
 
 
 def gait(
-    speed: float | np.ndarray,
-    duration: float | None = None,
-    fps: float = 30.0,
-    skeleton: Skeleton | None = None,
-    *,
-    style: GaitStyle = GaitStyle(),
-    phase: float = 0.0,
-    turn_rate: float | np.ndarray = 0.0,
-    direction: float | np.ndarray = 0.0,
-    seed: int = 0,
-    example: Motion | None = None,
+    speed: float | np.ndarray, duration: float | None = None, fps: float = 30.0, skeleton: Skeleton | None = None, *,
+    style: GaitStyle = GaitStyle(), phase: float = 0.0, turn_rate: float | np.ndarray = 0.0,
+    direction: float | np.ndarray = 0.0, seed: int = 0, example: Motion | None = None,
 ) -> Motion:
     """A body that travels at `speed` for `duration` seconds; it begins at the origin and faces +X.
 
@@ -126,11 +118,7 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
     balance.
     """
     height = 0.8 * (neutral.leg + neutral.ankle_height)
-    shift = (
-        height
-        * interpolate(at, course.times, course.acceleration)
-        / tables.GRAVITY
-    )
+    shift = height * interpolate(at, course.times, course.acceleration) / tables.GRAVITY
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
     limit = 0.30 * neutral.leg
     return shift * np.where(size > 1e-9, limit * np.tanh(size / limit) / np.maximum(size, 1e-9), 1.0)
@@ -144,15 +132,9 @@ def posture_over(
     count = len(course.times)
     rate = 1.0 / (course.times[1] - course.times[0])
     posture = Posture(
-        fps=round(rate / course.stride, 6),
-        heading=course.heading,
-        arms=pose_arms(course, style, seed),
-        wrists=np.full((count, 2), np.radians(8.0)),
-        ankles=np.zeros((count, 2, 3)),
-        feet=np.zeros((count, 2, 3)),
-        toes=np.zeros((count, 2)),
-        knees=np.full((count, 2), np.radians(2.0)),
-        **above,
+        fps=round(rate / course.stride, 6), heading=course.heading, arms=pose_arms(course, style, seed),
+        wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
+        toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
     )
     return with_feet(posture, course.times, steps, neutral)
 
@@ -169,9 +151,7 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...],
                     thigh_shank=thigh_shank(neutral, s)) for s in (0, 1)]
     ankles = [kept_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(thigh_shank(neutral, s))) for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
-    return posture.changed(
-        ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1)
-    )
+    return posture.changed(ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1))
 
 
 def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
@@ -185,10 +165,15 @@ def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Foot
     swing."""
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
-    begin = (_straightest(steps, times) + 0.006 - _EASE) * leg
-    eased = begin + _EASE * leg * np.tanh((far - begin) / (_EASE * leg))
-    share = np.where(steps.standing(times) | (far < begin), 1.0, eased / np.maximum(far, 1e-9))
-    return hip + away * share[:, None]
+    share = ease_reach(far, (_straightest(steps, times) + 0.006 - _EASE) * leg, _EASE * leg)
+    return hip + away * np.where(steps.standing(times), 1.0, share)[:, None]
+
+
+def ease_reach(far: np.ndarray, begin: float | np.ndarray, soft: float) -> np.ndarray:
+    """Share (T,) of distances `far` (T,) m that is gone where what lies beyond `begin` m is neared softly, never more
+    than `soft` m beyond it."""
+    eased = begin + soft * np.tanh((far - begin) / soft)
+    return np.where(far < begin, 1.0, eased / np.maximum(far, 1e-9))
 
 
 def thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:

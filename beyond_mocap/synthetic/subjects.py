@@ -133,15 +133,12 @@ def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> Kick
     approach = base.approach + manner.approach
     arms = [scale_rows(rows, out, out, 1.0, 1.0) for rows in (base.left_arm, base.right_arm)]
     return replace(
-        base,
-        approach=approach,
+        base, approach=approach,
         strides=tuple(manner.stride * (0.8 + 0.2 * effort) * stride for stride in base.strides),
         leg=_swung(base.leg, back, 0.72 + 0.28 * effort, follow),
         pelvis=tuple((t, side, tilt, _turned(t, about, turn, manner.approach)) for t, side, tilt, about in base.pelvis),
-        spine=tuple((t, side - manner.lean * _near_zero(t), tilt, turn * about)
-                    for t, side, tilt, about in base.spine),
-        left_arm=arms[0],
-        right_arm=arms[1],
+        spine=tuple((t, side - manner.lean * _near_zero(t), tilt, turn * about) for t, side, tilt, about in base.spine),
+        left_arm=arms[0], right_arm=arms[1],
     )
 
 
@@ -218,15 +215,11 @@ def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> T
     way = manner.stride * (0.62 + 0.38 * effort)
     raised = manner.lift * (0.25 + 0.75 * effort)
     lean = manner.lean * (0.55 + 0.45 * effort)
-    spine = [
-        (t, side - manner.slot * _near_zero(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine
-    ]
+    spine = [(t, side - manner.slot * _near_zero(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
     style = ThrowStyle(
-        pelvis=scale_rows(base.pelvis, 1.0, lean, turn),
-        spine=tuple(spine),
+        pelvis=scale_rows(base.pelvis, 1.0, lean, turn), spine=tuple(spine),
         right_arm=tuple((t, a, b, c if c > -60.0 else -60.0 + out * (c + 60.0), e) for t, a, b, c, e in base.right_arm),
-        left_arm=scale_rows(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0),
-        forearm=base.forearm,
+        left_arm=scale_rows(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0), forearm=base.forearm,
         hips=scale_rows(base.hips, way, 0.4 + 0.6 * way),
         left_foot=scale_rows(base.left_foot, way, 1.0, raised, raised, turn),
         right_foot=scale_rows(base.right_foot, way, 1.0, 1.0, 1.0, turn),
@@ -237,12 +230,9 @@ def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> T
 
 def _paced(rows: tuple, manner: ThrowManner) -> tuple:
     """The wind-up (before 0.35 s to release) and the follow-through (after 0.2 s) slower or faster."""
-    return tuple((_later(_earlier(row[0], manner.wind_up), manner.follow), *row[1:]) for row in rows)
 
+    def later(time: float) -> float:
+        time = time if time > -0.35 else -0.35 + manner.wind_up * (time + 0.35)
+        return time if time < 0.2 else 0.2 + manner.follow * (time - 0.2)
 
-def _earlier(time: float, pace: float) -> float:
-    return time if time > -0.35 else -0.35 + pace * (time + 0.35)
-
-
-def _later(time: float, pace: float) -> float:
-    return time if time < 0.2 else 0.2 + pace * (time - 0.2)
+    return tuple((later(row[0]), *row[1:]) for row in rows)

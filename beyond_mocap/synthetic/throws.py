@@ -24,8 +24,8 @@ from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT, keyed_rounded
+from .footsteps import lift_foot
+from .gestures import RIGHT, begin_plan, choose_style
 
 GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
@@ -100,8 +100,7 @@ _OVERARM = ThrowStyle(
     ),
 )  # fmt: skip
 _SIDEARM = replace(
-    _OVERARM,
-    spine=tuple((t, 0.15 * a, b, c) for t, a, b, c in _OVERARM.spine),
+    _OVERARM, spine=tuple((t, 0.15 * a, b, c) for t, a, b, c in _OVERARM.spine),
     right_arm=tuple((t, a, min(b, 84), c, e) for t, a, b, c, e in _OVERARM.right_arm),
 )
 STYLES = {"overarm": _OVERARM, "sidearm": _SIDEARM}
@@ -124,12 +123,8 @@ class Throw:
 
 
 def throw(
-    target: tuple[float, float, float] = (18.0, 0.0, 1.0),
-    speed: float = 25.0,
-    arm: str = "right",
-    style: str | ThrowStyle = "overarm",
-    skeleton: Skeleton | None = None,
-    fps: float = 120.0,
+    target: tuple[float, float, float] = (18.0, 0.0, 1.0), speed: float = 25.0, arm: str = "right",
+    style: str | ThrowStyle = "overarm", skeleton: Skeleton | None = None, fps: float = 120.0,
 ) -> Throw:
     """A throw out of standing at the origin, such that a ball without air flies through `target` (3,) metres.
 
@@ -137,11 +132,7 @@ def throw(
     adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown
     arm or style, a body without hands.
     """
-    how = style if isinstance(style, ThrowStyle) else STYLES.get(style)
-    if arm not in ("left", "right") or how is None:
-        raise InputError("throw", f"{style} with the {arm} arm", f"left or right, {' or '.join(STYLES)}")
-    if not SLOWEST <= speed <= FASTEST:
-        raise InputError("throw", f"{speed:g} m/s", f"{SLOWEST:g} to {FASTEST:g} m/s")
+    how = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)
     release, rate, turn = _aimed(swing, np.asarray(target, dtype=float), speed)
@@ -227,46 +218,22 @@ def _wanted_elevation(way: np.ndarray, speed: float) -> float:
 def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
     """The throw's posture at the planning rate."""
     times = np.arange(int(round((BEFORE + AFTER) * _PLAN)) + 1) / _PLAN - BEFORE
-    scale = neutral.leg / tables.LEG
-
-    def curve(rows) -> np.ndarray:
-        return keyed_rounded(rows, times, _ROUND * _PLAN)
-
     nothing = np.zeros_like(times)
-    body = identify(neutral.skeleton)
-    height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
-    way = curve(style.hips) * scale
-    pelvis, spine = np.radians(curve(style.pelvis)), np.radians(curve(style.spine))
-    arms = np.zeros((len(times), 2, 5))
-    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(curve(style.right_arm)), np.radians(curve(style.left_arm))
+    curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
+    way = curve(style.hips) * (neutral.leg / tables.LEG)
     forearm = np.radians(curve(style.forearm))
     arms[:, RIGHT, 4] = forearm[:, 0]
-    feet = [_foot(curve(rows), neutral, scale) for rows in (style.left_foot, style.right_foot)]
+    feet = [lift_foot(curve(rows), neutral) for rows in (style.left_foot, style.right_foot)]
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.2, 1.2)
     nod = -0.55 * (pelvis[:, 1] + spine[:, 1])
     return Posture(
-        fps=_PLAN,
-        hips=np.stack([way[:, 0], nothing, height - way[:, 1]], axis=-1),
-        heading=nothing,
-        pelvis=pelvis,
-        spine=spine,
-        head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1),
-        arms=arms,
+        fps=_PLAN, hips=np.stack([way[:, 0], nothing, height - way[:, 1]], axis=-1), heading=nothing, pelvis=pelvis,
+        spine=spine, head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1), arms=arms,
         wrists=np.stack([nothing + 0.1, forearm[:, 1]], axis=-1),
-        ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
-        feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
+        ankles=np.stack([foot[:, :3] for foot in feet], axis=1), feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
         toes=np.stack([np.clip(0.8 * foot[:, 4], 0.0, 0.7) * (foot[:, 2] < 0.3) for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )
-
-
-def _foot(rows: np.ndarray, neutral: Neutral, scale: float) -> np.ndarray:
-    """An ankle's way and the foot's turn (T, 6) out of rows (T, 5): ahead, left, raised, pitch, yaw in degrees."""
-    ahead, left, raised, pitch, yaw = rows.T
-    pitch, yaw = np.radians(pitch), np.radians(yaw)
-    up = neutral.ankle_height + raised * scale
-    up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
-    return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
 
 
 def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:

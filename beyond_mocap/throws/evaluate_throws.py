@@ -2,7 +2,7 @@
 
 `evaluate_throws(model, examples)` takes what was known of each example beforehand, scaled by height to the model's body
 as §4.5 has it, generates the motion again, and compares: hands and feet with where they were wanted (eq. 4.1), where
-the ball goes with where it was to go, the head, the smoothness, the bones, the joints' limits, seconds. The ball is held
+the ball goes with where it was to go, the head, the smoothness, the bones, joints' limits, seconds. The ball is held
 until the release and leaves with the place and velocity that it has then between two frames, read off a spline of the
 body's rotations: by places alone a hand that throws, seen 30 times a second, is a tenth too slow.
 """
@@ -139,13 +139,8 @@ def some_of_each(examples: Sequence[Example], motions: int | None) -> list[Examp
 
 
 def evaluate_throws(
-    model: ThrowModel,
-    examples: Sequence[Example],
-    options: Options = FULL,
-    *,
-    by_height: bool = True,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    model: ThrowModel, examples: Sequence[Example], options: Options = FULL, *, by_height: bool = True,
+    progress: Callable[[float, str], None] = lambda fraction, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> Evaluated:
     """The figures of a model on examples at its rate, on any skeletons. by_height: scale what is asked for by the ratio
     of the model's stature to the example's (§4.5). A motion that cannot be generated is left out and told."""
@@ -169,12 +164,10 @@ def _measured(model: ThrowModel, example: Example, options: Options, ratio: floa
     near, far, own = _impacts(made.motion, came - made.effectors, example, ratio, description.impact)
     head, share = _head(made.motion, example.motion)
     return ThrowFigures(
-        name=example.name, subject=example.subject,
-        deviation=deviations(came, description.effectors),
+        name=example.name, subject=example.subject, deviation=deviations(came, description.effectors),
         network=deviations(made.predicted, description.effectors),
-        body=deviations(made.effectors, description.effectors),
-        impact=near, far_impact=far, own_impact=own, head=head, head_share=share,
-        jerk=_jerk(made.motion) / max(ratio * _jerk(example.motion), 1e-9), bones=_bones(model, made),
+        body=deviations(made.effectors, description.effectors), impact=near, far_impact=far, own_impact=own, head=head,
+        head_share=share, jerk=_jerk(made.motion) / max(ratio * _jerk(example.motion), 1e-9), bones=_bones(model, made),
         beyond=_beyond(model, made.motion), seconds=made.seconds, duration=example.motion.duration,
     )  # fmt: skip
 

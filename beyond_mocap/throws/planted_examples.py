@@ -30,6 +30,7 @@ from ..motion.motion import Motion, place
 from ..motion.retargeting.adult import LEG, adult_skeleton
 from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.skeleton import Skeleton
+from ..synthetic.gestures import choose_style
 from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
 from ..synthetic.subjects import Person, make_kicker, make_throw, make_thrower, vary_kick
 from ..synthetic.throws import GRAVITY
@@ -179,13 +180,8 @@ class Kick:
 
 
 def kick(
-    target: tuple[float, float, float] = (11.0, 0.0, 1.0),
-    speed: float = 20.0,
-    foot: str = "right",
-    style: str | KickStyle = "instep",
-    skeleton: Skeleton | None = None,
-    fps: float = 120.0,
-    ball: Ball = FOOTBALL,
+    target: tuple[float, float, float] = (11.0, 0.0, 1.0), speed: float = 20.0, foot: str = "right",
+    style: str | KickStyle = "instep", skeleton: Skeleton | None = None, fps: float = 120.0, ball: Ball = FOOTBALL,
 ) -> Kick:
     """A kick out of three steps of a ball that lies at the origin, through `target` (3,) m.
 
@@ -193,11 +189,7 @@ def kick(
     adult. style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown
     foot or style.
     """
-    how = style if isinstance(style, KickStyle) else KICKS.get(style)
-    if foot not in ("left", "right") or how is None:
-        raise InputError("kick", f"{style} with the {foot} foot", f"left or right, {' or '.join(KICKS)}")
-    if not SLOWEST <= speed <= FASTEST:
-        raise InputError("kick", f"{speed:g} m/s", f"{SLOWEST:g} to {FASTEST:g} m/s")
+    how = choose_style("kick", foot, "foot", style=style, styles=KICKS, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     return _Aim(how, neutral, foot, ball).at(np.asarray(target, dtype=float), speed, fps)
 

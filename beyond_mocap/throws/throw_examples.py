@@ -88,15 +88,9 @@ class _Known:
 
 
 def examples_in(
-    folder: str | Path,
-    action: str = "throw",
-    fps: float = 30.0,
-    skeleton: Skeleton | None = None,
-    told: Callable[[str], None] = lambda line: None,
-    *,
-    mirror: bool = False,
-    progress: Callable[[float, str], None] = lambda share, text: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    folder: str | Path, action: str = "throw", fps: float = 30.0, skeleton: Skeleton | None = None,
+    told: Callable[[str], None] = lambda line: None, *, mirror: bool = False,
+    progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> list[Example]:
     """The examples of `action` ("throw" or "kick") below `folder`, at `fps` frames per second, each in its own frame.
 
@@ -137,7 +131,10 @@ def examples_in(
     if not found:
         raise InputError(folder, f"each {action} in it had to be left out", "some that can be read",
                          f"see the notes, and {_PAGE}")  # fmt: skip
-    return [each for example in found for each in ((example, _renamed(example)) if mirror else (example,))]
+    if not mirror:
+        return found
+    twins = (replace(mirrored(example), name=f"{example.name} (mirrored)") for example in found)
+    return [each for pair in zip(found, twins) for each in pair]
 
 
 def _told_of(path: Path, action: Action, words: Annotations, rows: list[_Known] | None) -> bool:
@@ -174,10 +171,6 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
         folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
         f"write NAME.txt beside NAME.bvh, or {TABLE_NAME}; see {_PAGE}",
     )
-
-
-def _renamed(example: Example) -> Example:
-    return replace(mirrored(example), name=f"{example.name} (mirrored)")
 
 
 def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: float, bring, told) -> list[Example]:

@@ -80,16 +80,8 @@ class Planted:
 
 
 def planted(
-    motion: Motion,
-    marker_set: str | tuple[str, ...] = "plug_in_gait",
-    seed: int = 0,
-    *,
-    noise: float = 0.0005,
-    softness: float = 1.0,
-    occlusion: float = 0.0,
-    swaps: int = 0,
-    jumps: int = 0,
-    unlabeled: int = 0,
+    motion: Motion, marker_set: str | tuple[str, ...] = "plug_in_gait", seed: int = 0, *, noise: float = 0.0005,
+    softness: float = 1.0, occlusion: float = 0.0, swaps: int = 0, jumps: int = 0, unlabeled: int = 0,
     ball: PlantedBall | None = None,
 ) -> Planted:
     """Markers on any humanoid `motion`, and a static trial of the same body.

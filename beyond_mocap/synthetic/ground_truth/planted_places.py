@@ -86,9 +86,8 @@ MIDDLE = {
     "CLAV": _trunk(62, 0, -15, 5.0), "MAN": _trunk(60, 0, -12, 5.0), "STRN": _trunk(92, 0, -150, 8.0),
     "RBAK": _trunk(-105, -95, -80, 9.0), "LBAK": _trunk(-105, 95, -80, 9.0),
     "SACR": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
-    "P1": Place(
-        "Hips", None, 0.0, offset=(-14, 0, -42), soft=5.0, wobble=0.5,
-    ), "P2": Place("Hips", None, 0.0, offset=(-10, 36, -22), soft=5.0, wobble=0.5),
+    "P1": Place("Hips", None, 0.0, offset=(-14, 0, -42), soft=5.0, wobble=0.5),
+    "P2": Place("Hips", None, 0.0, offset=(-10, 36, -22), soft=5.0, wobble=0.5),
     "P3": Place("Hips", None, 0.0, offset=(-10, -36, -22), soft=5.0, wobble=0.5),
 }  # fmt: skip
 SIDED = {
@@ -113,13 +112,11 @@ SIDED = {
     "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 14), "P1MT": _foot("ToeBase", 4, -38, 12),
     "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
     "HLX": Place("ToeBase", None, 0.0, offset=(55, -12, 14), soft=1.5, wobble=0.1),
-    "ASI": Place(
-        "Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4,
-    ), "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
+    "ASI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4),
+    "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
 }  # fmt: skip
-_ON_BLADE = Place(
-    "Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4,
-)  # where shoulder blades are tracked apart
+# where shoulder blades are tracked apart
+_ON_BLADE = Place("Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4)
 _PIG = (
     "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
     "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
@@ -144,9 +141,7 @@ SETS = {
             "RMANK LHEE LMT1 LMT5 RHEE RMT1 RMT5 LHLX RHLX"
         ).split()
     ),
-    "lower_body": tuple(
-        "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()
-    ),
+    "lower_body": tuple("LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()),
 }
 """Labels of the marker sets that can be planted."""
 STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}

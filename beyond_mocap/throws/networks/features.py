@@ -109,9 +109,7 @@ def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     ], axis=-1)  # fmt: skip
 
 
-def arm_input(
-    number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np
-):
+def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
     """(b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of the arm 0 (left) or 1 (§7.3)."""
     name = LIMB_OF[number]
     frame = _Frame(chains.references[name], pose, after, xp)

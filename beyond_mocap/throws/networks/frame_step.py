@@ -56,6 +56,7 @@ class Stepper:
         _check_widths(model, self.chains)
         self.limits = JointLimits(model.skeleton, _limits_of(model))
         self.effectors = list(self.chains.effectors)
+        self.floating_effectors = [self.chains.joints.index(joint) for joint in self.effectors]
         self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
@@ -64,7 +65,7 @@ class Stepper:
         much of the way from what the networks say to there each is taken, None for none of them. limited: joints are
         kept within their limits, and networks asked only for what is near what they know."""
         after, floating = self.predicted(pose, window, limited)
-        said = after.positions[self.effectors] if floating is None else self._said(floating)
+        said = after.positions[self.effectors] if floating is None else floating[self.floating_effectors]
         over = np.zeros(len(self.model.skeleton))
         if limited and share is None:
             after, over = self._limited(after)
@@ -86,9 +87,6 @@ class Stepper:
         y = network.frame(np.clip(x, *network.bounds) if bounded else x, theta).astype(float)
         floating = answers.floating(self.chains, settings, y, pose)[0]
         return answers.answered(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
-
-    def _said(self, floating: np.ndarray) -> np.ndarray:
-        return floating[[self.chains.joints.index(joint) for joint in self.effectors]]
 
     def _afloat(self, pose: Pose, floating: np.ndarray) -> Pose:
         places = pose.positions.copy()
@@ -156,8 +154,7 @@ def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
     and back to the wanted ones by tanh (§7.7.3)."""
     left, change, following = _fading(fps)
     return window._replace(
-        points=window.points + offset[:, None, :] * left,
-        deltas=window.deltas + offset[:, None, :] * change,
+        points=window.points + offset[:, None, :] * left, deltas=window.deltas + offset[:, None, :] * change,
         next=window.next + offset * following,
     )
 

@@ -170,8 +170,7 @@ def _windows(model: ThrowModel, description: Description) -> list[Windows]:
     """The window of the frame before the first, then those of all frames; the first two have the same phase."""
     before = description.effectors[:1] if description.before is None else description.before[-1:]
     longer = replace(
-        description,
-        effectors=np.concatenate([before, description.effectors]),
+        description, effectors=np.concatenate([before, description.effectors]),
         before=None if description.before is None or len(description.before) < 2 else description.before[:-1],
         hands=None if description.hands is None else np.concatenate([description.hands[:1], description.hands]),
         release=description.release + 1.0,
@@ -203,12 +202,10 @@ def _generated(model, description: Description, steps: list[Step], iterations: i
     return Generated(
         motion=motion_of(model.skeleton, root, local, description.fps),
         effectors=np.stack([step.pose.positions[effectors] for step in steps]),
-        predicted=np.stack([step.predicted for step in steps]),
-        wanted=description.effectors,
+        predicted=np.stack([step.predicted for step in steps]), wanted=description.effectors,
         over=np.stack([step.over for step in steps]),
         floating=None if steps[0].floating is None else np.stack([step.floating for step in steps]),
-        iterations=iterations,
-        seconds=seconds,
+        iterations=iterations, seconds=seconds,
     )
 
 

@@ -17,7 +17,8 @@ from beyond_mocap.throws.networks.frame_step import OneFrame
 from beyond_mocap.throws.networks.kinematics import Pose, matrices, one_pose, places_and_turns
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
-from beyond_mocap.throws.networks.training_set import leg_reach, training_set
+from beyond_mocap.throws.networks.training_set import leg_reach
+from tests.core.linear_throws import training_set
 
 
 def thrown():
