@@ -195,12 +195,8 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
-    return hann_smooth(_running_max(need, width), width)
-
-
-def _running_max(values: np.ndarray, width: int) -> np.ndarray:
-    padded = np.pad(values, width, mode="edge")
-    return np.max(np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1), axis=-1)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, width, mode="edge"), 2 * width + 1)
+    return hann_smooth(np.max(around, axis=-1), width)
 
 
 def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:

@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, identify
+from ..motion.humanoid import identify
 from ..motion.motion import pose_kinematics
 from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, to_motion
@@ -98,18 +98,14 @@ def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
 def thickness(skeleton: Skeleton) -> np.ndarray:
     """(J,) m from each joint to the skin."""
     body = identify(skeleton)
+    parts = [("chest", joint) for joint in body.spine]
+    parts += [(role, getattr(limb, role)) for limb in (body.left, body.right) for role in THICKNESS
+              if hasattr(limb, role)]  # fmt: skip
     out = np.full(len(skeleton), _OTHERS)
-    for role, joint in _parts(body):
+    for role, joint in (*parts, ("neck", body.neck), ("head", body.head), ("hips", body.hips)):
         if joint is not None:
             out[joint] = THICKNESS[role]
     return out
-
-
-def _parts(body: Humanoid):
-    yield from ((("chest", joint) for joint in body.spine))
-    for limb in (body.left, body.right):
-        yield from ((role, getattr(limb, role)) for role in THICKNESS if hasattr(limb, role))
-    yield from (("neck", body.neck), ("head", body.head), ("hips", body.hips))
 
 
 # degrees: flexion, abduction, inward turn and elbow of the lower and the upper arm; metres for an adult: ankles ahead

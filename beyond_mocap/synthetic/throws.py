@@ -182,7 +182,8 @@ def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, floa
         off = []
         for instant in instants:
             spot, velocity = swing.released(instant)
-            off.append(_elevation(velocity) - _wanted_elevation(turned - spot, speed))
+            rises = float(np.arctan2(velocity[2], np.hypot(velocity[0], velocity[1])))
+            off.append(rises - _wanted_elevation(turned - spot, speed))
         at = _first_zero(instants, np.array(off), speed)
         spot, velocity = swing.released(at)
         rate = speed / float(np.linalg.norm(velocity))
@@ -200,10 +201,6 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
         )
     zeros = instants[change] + (instants[1] - instants[0]) * off[change] / (off[change] - off[change + 1])
     return float(zeros[np.argmin(np.abs(zeros))])
-
-
-def _elevation(velocity: np.ndarray) -> float:
-    return float(np.arctan2(velocity[2], np.hypot(velocity[0], velocity[1])))
 
 
 def _wanted_elevation(way: np.ndarray, speed: float) -> float:

@@ -60,7 +60,9 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     that are shipped. InputError where it cannot be written, or where a weight is too large for float16.
     """
     arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
-    arrays |= _body_out(model) | _networks_out(model) | _examples_out(model)
+    arrays |= {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
+    arrays |= {name: one for name in ("joint_limits", "reference") if (one := getattr(model, name)) is not None}
+    arrays |= _networks_out(model) | _examples_out(model)
     if half:
         arrays = {name: one if name == HEADER else _halved(name, one) for name, one in arrays.items()}
     whole = io.BytesIO()
@@ -90,11 +92,6 @@ def _example_out(example: Example) -> dict:
         "launch": None if example.launch is None else [float(one) for one in example.launch],
         "stature": float(example.stature),
     }  # fmt: skip
-
-
-def _body_out(model: ThrowModel) -> dict:
-    out = {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
-    return out | {name: value for name in ("joint_limits", "reference") if (value := getattr(model, name)) is not None}
 
 
 def _networks_out(model: ThrowModel) -> dict:

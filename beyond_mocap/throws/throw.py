@@ -273,6 +273,7 @@ class _Work:
         self.limb = EFFECTORS.index(order.limb) if order.limb else _usual_limb(model)
         self._check()
         used = {example.limb for example in model.examples}
+        self._human = f"which is what a human gives a {'kick' if self.kicks else 'throw'}"
         self.mirrored = self.limb not in used and self.limb ^ 1 in used
         self.own_limb = self.limb ^ 1 if self.mirrored else self.limb
         kind = order.ball or ("football" if self.kicks else "baseball")
@@ -340,7 +341,8 @@ class _Work:
         spin, fastest = np.median(spins[own], axis=0), float(np.linalg.norm(self.launches[own], axis=1).max())
         self._check_far(start, end, spin, fastest)
         self.arcs = arcs(start, end, self.ball, spin)
-        self._check_human(self.arcs.slowest)
+        if self.arcs.slowest > self.fastest:
+            raise self._too_far(f"{self.arcs.slowest:.0f} m/s or more", self.fastest, self._human)
         self._check_reach(fastest)
         self._check_steep(own, min(self.fastest, _BEYOND_EXAMPLES * fastest))
         wishes, seed = self._by_pace(own, ahead), self.order.seed
@@ -379,14 +381,17 @@ class _Work:
 
     def _check_far(self, start: np.ndarray, end: np.ndarray, spin: np.ndarray, own: float) -> None:
         """InputError for a target that is plainly too far, before anything slow is done."""
-        human = f"which is what a human gives a {'kick' if self.kicks else 'throw'}"
         model = f"the model's fastest example has {own:.0f}"
-        for most, what in ((self.fastest, human), (_BEYOND_EXAMPLES * own, model)):
+        for most, what in ((self.fastest, self._human), (_BEYOND_EXAMPLES * own, model)):
             slowest = _slowest_without_air(start, end, self.ball.gravity)
             if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
-                far = float(np.linalg.norm(self.target[:2] - self._where()))
-                raise InputError("target", f"{far:.0f} m away: that takes more than {most:.0f} m/s",
-                                 f"at most {most:.0f} m/s, {what}", "choose a nearer or lower target")  # fmt: skip
+                raise self._too_far(f"more than {most:.0f} m/s", most, what)
+
+    def _too_far(self, takes: str, most: float, what: str) -> InputError:
+        """A target that takes such a speed, where no more than `most` m/s are there; what: says why."""
+        far = float(np.linalg.norm(self.target[:2] - self._where()))
+        return InputError("target", f"{far:.0f} m away: that takes {takes}", f"at most {most:.0f} m/s, {what}",
+                          "choose a nearer or lower target")  # fmt: skip
 
     def _check_steep(self, own: list[int], most: float) -> None:
         """InputError for a target to which the ball has to leave far more steeply than in any of the examples."""
@@ -399,16 +404,6 @@ class _Work:
                 f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"
             )
             raise InputError("target", found, expected, "move it further off or lower")
-
-    def _check_human(self, slowest: float) -> None:
-        """InputError for a target that takes a faster ball than a human gives."""
-        far, most = np.linalg.norm(self.target[:2] - self._where()), self.fastest
-        if slowest > most:
-            raise InputError(
-                "target", f"{far:.0f} m away: that takes {slowest:.0f} m/s or more",
-                f"at most {most:.0f} m/s, which is what a human gives a {'kick' if self.kicks else 'throw'}",
-                "choose a nearer or lower target",
-            )
 
     def _check_reach(self, own: float) -> None:
         """InputError for a speed that does not reach the target, or that is too far beyond the examples' `own`."""

@@ -137,7 +137,9 @@ class _Loop:
             velocities = (self.wanted[1] - self.wanted[0]) * self.fps
             pose = start_pose(self.ready.model, self.wanted[0], velocities, self.limb)
         places = pose.positions[self.ready.effectors]
-        best = Step(pose, pose, places, np.zeros(len(self.ready.model.skeleton)), self._floating(pose))
+        single = self.ready.model.settings.kind == "single"
+        floating = pose.positions[list(self.ready.chains.joints)] if single else None
+        best = Step(pose, pose, places, np.zeros(len(self.ready.model.skeleton)), floating)
         least, stale, count = self._off(best), 0, 0
         last = best
         while least > self.options.tolerance and count < self.options.pose_iterations and stale < _PATIENCE:
@@ -150,10 +152,6 @@ class _Loop:
     def _off(self, step: Step) -> float:
         places = step.state.positions[self.ready.effectors]
         return float(np.sqrt(((places - self.wanted[0]) ** 2).sum(-1)).max())
-
-    def _floating(self, pose: Pose) -> np.ndarray | None:
-        single = self.ready.model.settings.kind == "single"
-        return pose.positions[list(self.ready.chains.joints)] if single else None
 
 
 def _shares(description: Description, options: Options) -> np.ndarray:

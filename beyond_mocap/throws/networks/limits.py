@@ -29,7 +29,7 @@ from ...base.errors import InputError
 from ...base.vectors import unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import identify
-from ...motion.motion import Motion, forward_kinematics
+from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import Skeleton, frozen_array
 from .kinematics import transposed
 
@@ -239,7 +239,8 @@ class LimbLimits:
         """The limits of a model's limb `own_joints` for the limb `joints` of `shown`, which shows `own`, a motion of
         the model's skeleton, frame by frame, at the same place. mirrored: it shows its mirror image at y = 0."""
         frames = np.unique(np.linspace(0, len(own) - 1, _FRAMES).astype(int))
-        turns = [quaternion.to_matrix(forward_kinematics(_at(motion, frames))[1]) for motion in (own, shown)]
+        poses = [(m.skeleton, m.root_positions[frames], m.rotations[frames]) for m in (own, shown)]
+        turns = [quaternion.to_matrix(pose_kinematics(*pose)[1]) for pose in poses]
         image = _MIRROR if mirrored else np.eye(3)
 
         def between(theirs: list[int], mine: list[int]) -> np.ndarray:
@@ -270,7 +271,3 @@ class LimbLimits:
     def _carried(self, rotations: np.ndarray) -> np.ndarray:
         """(..., C, 3, 3): as the model's joints would be turned."""
         return self.above @ quaternion.to_matrix(rotations) @ transposed(self.axes)
-
-
-def _at(motion: Motion, frames: np.ndarray) -> Motion:
-    return Motion(motion.skeleton, motion.root_positions[frames], motion.rotations[frames], motion.fps)
