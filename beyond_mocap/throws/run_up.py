@@ -110,7 +110,8 @@ def construct_run_up(
     more = add_throw_clip(search_library(library, resolved, report), own, release, action)
     with threadpool_limits(limits=1):
         order = _order(more, resolved)
-        edit = PathSearch(more, order, balanced(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled).run()
+        search = PathSearch(more, order, balanced(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
+        edit = search.run()
         report(0.8, "Laying out")
         construction = _construction(more, resolved, order, edit, _heading_of(own, at - release, between))
         planted, _ = construction.lay_out()
