@@ -100,11 +100,6 @@ class Evaluated:
         return np.array([one.network for one in self.motions]).reshape(-1, 4)
 
     @property
-    def body(self) -> np.ndarray:
-        """(N, 4) m, with bones of constant length."""
-        return np.array([one.body for one in self.motions]).reshape(-1, 4)
-
-    @property
     def impact(self) -> np.ndarray:
         """(N,) m."""
         return np.array([one.impact for one in self.motions])
@@ -113,15 +108,19 @@ class Evaluated:
         """All of it, as `files.tables` writes it; means are over what are numbers, of motions that kept their body."""
         lost = find_lost(self.deviation)
         whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
-        inside = kept(self.impact[~lost])
+        impact = self.impact[~lost]
+        inside = kept(impact)
+
+        def means_of(name: str) -> dict[str, float]:
+            columns = np.array([getattr(one, name) for one in whole]).reshape(-1, 4).T
+            return dict(zip(EFFECTORS, map(_mean, columns), strict=True))
+
         return {
             "options": asdict(self.options), "left_out": list(self.left_out), "motions": len(self.motions),
             "lost": int(lost.sum()), "subjects": sorted({one.subject for one in self.motions}),
-            "deviation_m": dict(zip(EFFECTORS, _means(self.deviation[~lost]), strict=True)),
-            "network_deviation_m": dict(zip(EFFECTORS, _means(self.network[~lost]), strict=True)),
-            "body_deviation_m": dict(zip(EFFECTORS, _means(self.body[~lost]), strict=True)),
-            "impact_m": _mean(self.impact[~lost][inside]),
-            "impacts_culled": int(np.isfinite(self.impact[~lost]).sum() - inside.sum()),
+            "deviation_m": means_of("deviation"), "network_deviation_m": means_of("network"),
+            "body_deviation_m": means_of("body"), "impact_m": _mean(impact[inside]),
+            "impacts_culled": int(np.isfinite(impact).sum() - inside.sum()),
             **{name: _mean([getattr(one, name) for one in whole]) for name in _OTHERS},
             "each": [plain(vars(one)) for one in self.motions],
         }  # fmt: skip
@@ -240,10 +239,6 @@ def _mean(values) -> float:
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     return float(values.mean()) if len(values) else np.nan
-
-
-def _means(values: np.ndarray) -> list[float]:
-    return [_mean(column) for column in values.T]
 
 
 def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
