@@ -12,6 +12,7 @@ from beyond_mocap.base.errors import BeyondMocapError
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.evaluate_throws import FULL, RAW, evaluate_throws
+from beyond_mocap.throws.network_npz import shipped_model
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import describe, example_of
 from beyond_mocap.throws.networks.features import widths
@@ -20,7 +21,8 @@ from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
 from beyond_mocap.throws.networks.phases import weigh_points_at
 from beyond_mocap.throws.planted_examples import planted
-from beyond_mocap.throws.throw import Order, shipped_model, throw_at
+from beyond_mocap.throws.throw import throw_at
+from beyond_mocap.throws.throw_order import Order
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of made people whom no shipped weights saw, and movements of each."""

@@ -7,6 +7,8 @@ import io
 import json
 import os
 from dataclasses import asdict, fields
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from .networks.example import Example
 from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
 
+WEIGHTS = Path(__file__).parent / "networks" / "weights"
+"""Where the weights that come with the project lie, one file an action."""
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
 LARGEST = 300_000_000
@@ -51,6 +55,15 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
         return _model({name: one.astype(np.float32) if one.dtype == half else one for name, one in arrays.items()})
     except InputError as error:
         raise InputError(path, str(error)) from None
+
+
+@lru_cache(maxsize=4)
+def shipped_model(action: str) -> ThrowModel:
+    """The model of "throw" or "kick" that comes with the project. InputError where it is missing."""
+    path = WEIGHTS / f"{action}.npz"
+    if not path.is_file():
+        raise InputError(path, "no such weights", "weights of this action", "train some: beyond-mocap throw train")
+    return read_model(path)
 
 
 def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) -> None:
