@@ -20,7 +20,6 @@ from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.networks.model import SINGLE, ModelSettings
 from beyond_mocap.throws.networks.network import forward
 from beyond_mocap.throws.networks.phases import weigh_points
-from beyond_mocap.throws.networks.training_set import Steps
 
 from .config import TrainingConfig
 from .networks import ARRAYS, RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
@@ -96,7 +95,10 @@ class Networks:
         held = np.zeros(len(self.lengths), bool) if held is None else held
         held = np.repeat(held, np.array(self.lengths) - 1)
         told = single_steps(recorded)
-        beside = self._beside(told) if config.linear_start and config.start_noise else None
+        beside = None  # the same steps from poses beside the truth
+        if config.linear_start and config.start_noise:
+            off = drawn(chains, len(told.pose.root), config.start_noise, config.seed)
+            beside = told._replace(pose=disturbed(chains, told.pose, *(one.astype(np.float32) for one in off)))
         for name in self.settings.networks:
             x, y, phase = step_arrays(name, chains, self.settings, told, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
@@ -112,11 +114,6 @@ class Networks:
                 self._sums[name] = self._sums_of(name, parts, theta, held)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
-
-    def _beside(self, told: Steps) -> Steps:
-        """The same steps from poses beside the truth."""
-        off = drawn(self.chains, len(told.pose.root), self.config.start_noise, self.config.seed)
-        return told._replace(pose=disturbed(self.chains, told.pose, *(one.astype(np.float32) for one in off)))
 
     def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
         """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those

@@ -145,7 +145,10 @@ def kicked(
     foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
     it. loft: degrees by which its toes point less down there. fps: frames per second.
     """
-    plan = _planned(style, neutral, foot, lift=lift, loft=loft, first=-BEFORE, last=AFTER)
+    times = np.arange(int(round((AFTER + BEFORE) * _PLAN)) + 1) / _PLAN - BEFORE
+    posture, curve = _upright(style, neutral, times)
+    plan = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
+    plan = mirror(plan) if foot == "left" else plan
     seconds = np.arange(int(np.floor((len(plan) - 1) / _PLAN / rate * fps + 1e-6)) + 1) / fps
     root, rotations = at_frames(plan, seconds * rate * _PLAN)
     return place(Motion(plan.skeleton, root, rotations, fps), turn)
@@ -169,14 +172,6 @@ def contact(
     places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
     line = places[:, [limb.foot, limb.toe_or_foot]].reshape(len(each), 3, 2, 3)
     return line[:, 1], 0.5 * _PLAN * (line[:, 2] - line[:, 0])
-
-
-def _planned(style, neutral: Neutral, foot: str, lift: float, loft: float, first: float, last: float) -> Motion:
-    """The kick between two seconds, finely."""
-    times = np.arange(int(round((last - first) * _PLAN)) + 1) / _PLAN + first
-    posture, curve = _upright(style, neutral, times)
-    motion = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
-    return mirror(motion) if foot == "left" else motion
 
 
 def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Posture, Callable]:

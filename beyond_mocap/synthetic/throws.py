@@ -27,7 +27,6 @@ from . import gait_tables as tables
 from .footsteps import lift_foot
 from .gestures import RIGHT, begin_plan, choose_style
 
-GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
 SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
@@ -206,10 +205,10 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
 def _wanted_elevation(way: np.ndarray, speed: float) -> float:
     """Elevation (radians) of the flatter arc without air that covers `way` (3,) metres; InputError where none does."""
     level, up = float(np.hypot(way[0], way[1])), float(way[2])
-    inside = speed**4 - GRAVITY * (GRAVITY * level**2 + 2.0 * up * speed**2)
+    inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
         raise InputError("throw", "a target out of reach", f"one that {speed:g} m/s reach", "throw faster or nearer")
-    return float(np.arctan2(speed**2 - np.sqrt(inside), GRAVITY * level))
+    return float(np.arctan2(speed**2 - np.sqrt(inside), tables.GRAVITY * level))
 
 
 def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:

@@ -83,9 +83,6 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     atomic_write(path, whole.getvalue())
 
 
-# -- writing
-
-
 def _header(model: ThrowModel) -> dict:
     skeleton = model.skeleton
     return {
@@ -134,9 +131,6 @@ def _halved(name: str, values: np.ndarray) -> np.ndarray:
     return values.astype(np.float16)
 
 
-# -- reading
-
-
 def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     """The model that arrays make; every array is used once, none is left over."""
     header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
@@ -145,7 +139,9 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     if header.get("version") != VERSION:
         raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
     check_names(header, HEADER, _ROWS, _ROWS)
-    settings = _settings(header["settings"])
+    names = [field.name for field in fields(ModelSettings)]
+    check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])
+    settings = ModelSettings(**header["settings"])
     skeleton = _skeleton(header["skeleton"], arrays)
     networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
     rows = entries(header["examples"], "examples")
@@ -157,12 +153,6 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
     return model
-
-
-def _settings(row) -> ModelSettings:
-    names = [field.name for field in fields(ModelSettings)]
-    check_names(row, "settings", names, [name for name in names if name not in ("guided", "carried")])
-    return ModelSettings(**row)
 
 
 def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:

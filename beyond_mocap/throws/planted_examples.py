@@ -30,12 +30,12 @@ from ..motion.motion import Motion, place
 from ..motion.retargeting.adult import LEG, adult_skeleton
 from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.skeleton import Skeleton
+from ..synthetic.gait_tables import GRAVITY
 from ..synthetic.gestures import choose_style
 from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
 from ..synthetic.subjects import Person, make_kicker, make_throw, make_thrower, vary_kick
-from ..synthetic.throws import GRAVITY
 from .letting_go import strike_ball
-from .throw_examples import LAUNCH, TABLE_NAME, TARGET
+from .throw_records import LAUNCH, TABLE_NAME, TARGET
 
 COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH, "ball_x_m", "ball_y_m", "ball_z_m")
 RATE = 120.0

@@ -171,7 +171,9 @@ class OneFrame:
         self.networks = [model.networks[name].frame for name in HIERARCHY]
         self.bounds = [model.networks[name].bounds for name in HIERARCHY]
         self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
-        self.plans = {name: _plan(chains, name) for name in HIERARCHY}
+        parents, offsets = chains.skeleton.parents, chains.skeleton.offsets
+        self.plans = {name: [(joint, parents[joint], offsets[joint]) for joint in chains.known[name]]
+                      for name in HIERARCHY}  # fmt: skip
         self.said = [list(predicted(name, chains, settings)) for name in HIERARCHY]
         self.limb_joints = [joint for said in self.said[2:] for joint in said]
         self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
@@ -277,14 +279,9 @@ class OneFrame:
         return np.array(weigh_points_at((float(stretch) - low) / (high - low), self.points), np.float32)
 
 
-def _plan(chains: Chains, name: str) -> list[tuple[int, int, np.ndarray]]:
-    """Joint, parent and offset of all joints that are known with a chain, parents first."""
-    skeleton = chains.skeleton
-    return [(joint, skeleton.parents[joint], skeleton.offsets[joint]) for joint in chains.known[name]]
-
-
 def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
-    """Puts the joints of a plan, in `after` itself, where its local rotations bring them. given: turns in the world."""
+    """Puts the joints of a plan (joint, parent, offset), parents first, in `after` itself, where its local rotations
+    bring them. given: turns in the world."""
     local, places, turns = after.local, after.positions, after.turns
     for joint, parent, offset in plan:
         if parent < 0:
