@@ -11,10 +11,8 @@ import numpy as np
 
 from ...base.errors import InputError
 from . import answers, features
-from .answers import predicted
 from .chains import HIERARCHY, LIMB_OF, Chains, chains_of
 from .description import BACK, SAMPLES, STEP, Windows
-from .features import carry_hips
 from .kinematics import Pose
 from .limb_reach import LimbReach, posed
 from .limits import JointLimits, learn
@@ -174,7 +172,7 @@ class OneFrame:
         parents, offsets = chains.skeleton.parents, chains.skeleton.offsets
         self.plans = {name: [(joint, parents[joint], offsets[joint]) for joint in chains.known[name]]
                       for name in HIERARCHY}  # fmt: skip
-        self.said = [list(predicted(name, chains, settings)) for name in HIERARCHY]
+        self.said = [list(answers.predicted(name, chains, settings)) for name in HIERARCHY]
         self.limb_joints = [joint for said in self.said[2:] for joint in said]
         self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
         self.references = [chains.references[name] for name in LIMB_OF]
@@ -211,7 +209,7 @@ class OneFrame:
         start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
         trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
         places = pose.positions[self.hip_sees] - start
-        guide = [carry_hips(self.chains, pose, window, start)] if self.carried else []
+        guide = [features.carry_hips(self.chains, pose, window, start)] if self.carried else []
         return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees], *guide)
 
     def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
