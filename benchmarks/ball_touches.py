@@ -15,8 +15,7 @@ from benchmarks.touch_score import Reading, ReadTouch, Score, read_touches, scor
 from beyond_mocap.ball.solve_ball import solve_ball
 from beyond_mocap.ball.tracked.solve import SolvedBall
 from beyond_mocap.files.tracking.tracking import Match, MatchPlayer, read_match
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import Feed, sampled
+from beyond_mocap.synthetic.ground_truth.planted import Feed, planted_match, sample_feed
 
 MATCHES = {"nl2019": "nl2019_half1.dat", "dutch": "dutch_6min.dat"}
 BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
@@ -82,7 +81,7 @@ def planted(name: str, seconds: float = 180.0, seed: int = 11, **feed) -> Measur
     touches = tuple(
         ReadTouch(t.time, (t.player,), None, t.part, t.word) for t in match.touches if 1.2 < t.time < seconds - 1
     )
-    solved = solve_ball(of_feed(sampled(match, **feed)))
+    solved = solve_ball(of_feed(sample_feed(match, **feed)))
     reading = Reading(((1.2, seconds - 1.0),), touches, (ReadTouch(1.0),))
     return Measured(name, _score(solved, reading), solved, reading)
 

@@ -14,8 +14,7 @@ from beyond_mocap.markers.cleaning.clean import clean
 from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_error import PlantedError, planted_error
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, PlantedError, planted, planted_error
 from beyond_mocap.synthetic.throws import throw
 
 CLIPS = {

@@ -12,15 +12,17 @@ from beyond_mocap.base.errors import BeyondMocapError
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.evaluate_throws import FULL, RAW, evaluate_throws
-from beyond_mocap.throws.networks import phase_function
+from beyond_mocap.throws.network_npz import shipped_model
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import describe, example_of
 from beyond_mocap.throws.networks.features import widths
 from beyond_mocap.throws.networks.generate import Options, generate
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
+from beyond_mocap.throws.networks.phases import weigh_points_at
 from beyond_mocap.throws.planted_examples import planted
-from beyond_mocap.throws.throw import Order, shipped_model, throw_at
+from beyond_mocap.throws.throw import throw_at
+from beyond_mocap.throws.throw_order import Order
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of made people whom no shipped weights saw, and movements of each."""
@@ -121,7 +123,7 @@ def networks_row(kind: str, points: int, layers: int, units: int) -> str:
     random = np.random.default_rng(1)
     made = [_network(random, *size, settings) for size in widths(chains_of(adult_skeleton(1.8)), settings).values()]
     inputs = [random.normal(size=network.inputs).astype(np.float32) for network in made]
-    thetas = [phase_function.weights_at(frame / FRAMES, points) for frame in range(FRAMES)]
+    thetas = [weigh_points_at(frame / FRAMES, points) for frame in range(FRAMES)]
 
     def all_frames():
         for theta in thetas:

@@ -82,10 +82,12 @@ def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
     changes: values that stand above the file's, None where there is none. InputError, one line: no such file, no JSON,
     an unknown name, a value out of its range.
     """
-    told = {} if path is None else _object(Path(path))
-    return config_of(
-        {**told, **{name: value for name, value in changes.items() if value is not None}}, path or "config"
-    )
+    told = {}
+    if path is not None:
+        told = values.object_of(utf8(Path(path), "a training's config", LARGEST), str(path), PAGE)
+        values.check_object(told, str(path))
+    changes = {name: value for name, value in changes.items() if value is not None}
+    return config_of({**told, **changes}, path or "config")
 
 
 def config_of(told: dict, where: object = "config") -> TrainingConfig:
@@ -100,12 +102,6 @@ def config_of(told: dict, where: object = "config") -> TrainingConfig:
         return replace(start, settings=settings, **{name: read[name] for name in read if name not in of_model})
     except InputError as error:  # which does not know whose values they are
         raise InputError(where, str(error)) from None
-
-
-def _object(path: Path) -> dict:
-    told = values.object_of(utf8(path, "a training's config", LARGEST), str(path), PAGE)
-    values.check_object(told, str(path))
-    return told
 
 
 def _value(value, default, where: str):

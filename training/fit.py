@@ -1,12 +1,17 @@
 """Adam on any problem: epochs, macro-epochs with a checkpoint, a falling learning rate, a limit of time.
 
 The same seed gives the same bits on one machine, broken off and resumed or not; with a limit of time the result depends
-on how fast the machine is.
+on how fast the machine is. A training that was broken off goes on where its last checkpoint was written: parameters,
+the optimizer's state and how far it was, in one file beside the weights, written whole or not at all.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import time
+import zipfile
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,15 +24,17 @@ import numpy as np
 import optax
 
 from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.files.whole import beside
 
-from . import checkpoint as kept
 from .config import TrainingConfig
 
 CLIP = 1.0
 """Longest gradient that is followed; a frame fed back many times can make a long one."""
+VERSION = 1
+NEXT_STEP = "give the same command again, or leave --resume out to begin anew"
 
 
-# In which order a training sees its examples: stretches of some frames, shuffled anew in each epoch.
+# In which order a training sees its examples: stretches of some frames, shuffled again in each epoch.
 
 
 def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
@@ -86,13 +93,8 @@ class Trained:
 
 
 def fit(
-    problem: Problem,
-    config: TrainingConfig,
-    *,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    minutes: float | None = None,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    problem: Problem, config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
+    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Trained:
     """Trains a problem. checkpoint: where one is written after each macro-epoch and when cancelled. resume: from there.
@@ -105,7 +107,7 @@ def fit(
     state = (params, adam.init(params))
     epoch, spent, losses = 0, 0.0, ()
     if resume and checkpoint is not None:
-        old = kept.read(checkpoint, state, problem.fits)
+        old = read_checkpoint(checkpoint, state, problem.fits)
         state, epoch, spent, losses = old.state, old.epoch, old.seconds, old.losses
     begun = time.perf_counter() - spent
     steps, parts = _steps(problem, adam), {}
@@ -113,7 +115,7 @@ def fit(
     def keep() -> None:
         if checkpoint is not None:
             seconds = time.perf_counter() - begun
-            kept.write(checkpoint, kept.Checkpoint(state, epoch, seconds, losses, problem.fits))
+            write_checkpoint(checkpoint, Checkpoint(state, epoch, seconds, losses, problem.fits))
 
     while (share := _share(epoch, time.perf_counter() - begun, config, minutes)) < 1.0:
         progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
@@ -182,3 +184,60 @@ def _epoch(problem, config, step, state, epoch, frames, rate):
         told.append(parts)
     told = jax.device_get(told)
     return state, {name: float(np.mean([parts[name] for parts in told])) for name in told[0]}
+
+
+@dataclass(frozen=True, eq=False)
+class Checkpoint:
+    """How far a training is. state: parameters and optimizer's state, a tree of arrays. epoch: epochs done. seconds:
+    time spent. losses: (E,) mean loss of each epoch. fits: what it was trained on and how, as one text to compare."""
+
+    state: object
+    epoch: int
+    seconds: float
+    losses: tuple[float, ...]
+    fits: str
+
+
+def checkpoint_path(out: str | os.PathLike) -> Path:
+    """Where the checkpoint of the weights at `out` stands."""
+    out = Path(out)
+    return out.with_name(f"{out.stem}.checkpoint.npz")
+
+
+def check_checkpoint(path: Path) -> None:
+    """InputError where there is no checkpoint to go on from."""
+    if not path.is_file():
+        raise InputError(path, "no checkpoint there", "one, for --resume", "leave --resume out to begin anew")
+
+
+def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
+    """Writes it whole. InputError where the folder cannot be written."""
+    leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(checkpoint.state)]
+    told = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits}
+    with beside(path, ".npz") as part:
+        np.savez(part, told=np.array(json.dumps(told)), losses=np.array(checkpoint.losses, float),
+                 **{f"leaf_{i:04d}": leaf for i, leaf in enumerate(leaves)})  # fmt: skip
+
+
+def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
+    """The checkpoint at `path`, whose state has the form of the tree `like`.
+
+    InputError, one line: missing, damaged, of another version, or of a training with other settings or recordings.
+    """
+    check_checkpoint(path)
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            told = json.loads(str(file["told"][()]))
+            losses = tuple(float(one) for one in file["losses"])
+            leaves = [file[name] for name in sorted(name for name in file.files if name.startswith("leaf_"))]
+        version, epoch, seconds, trained = (told[name] for name in ("version", "epoch", "seconds", "fits"))
+    except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
+            NotImplementedError, RuntimeError, AttributeError) as error:
+        raise InputError(path, f"is no checkpoint that can be read ({type(error).__name__})", "", NEXT_STEP) from None
+    if version != VERSION:
+        raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
+    wanted, tree = jax.tree.flatten(like)
+    if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype) for b in map(np.asarray, wanted)]:
+        raise InputError(path, "of a training with other settings or recordings", "", NEXT_STEP)
+    state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
+    return Checkpoint(state, int(epoch), float(seconds), losses, fits)

@@ -10,7 +10,6 @@ import jax.numpy as jnp
 import numpy as np
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.networks import phase_function
 from beyond_mocap.throws.networks.answers import answered, ends, network_output
 from beyond_mocap.throws.networks.chains import LIMB_OF, Chains
 from beyond_mocap.throws.networks.description import Windows
@@ -20,13 +19,11 @@ from beyond_mocap.throws.networks.limb_reach import bent_limb, hinge_axes
 from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.networks.model import SINGLE, ModelSettings
 from beyond_mocap.throws.networks.network import forward
-from beyond_mocap.throws.networks.training_set import Steps
+from beyond_mocap.throws.networks.phases import weigh_points
 
-from .arrays import ARRAYS
 from .config import TrainingConfig
-from .disturbed import disturbed, drawn
-from .networks import RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
-from .recordings import Recordings, single_steps, step_arrays
+from .networks import ARRAYS, RIDGES, Linear, Sums, first_weights, linear_start, scales_of, sums
+from .recordings import Recordings, disturbed, drawn, single_steps, step_arrays
 
 DROPPED = (SINGLE, "hip", "body")
 """Networks that are trained with dropout (§7.6)."""
@@ -47,9 +44,7 @@ def joint_error(y, wanted, scale):
     return jnp.mean(((y - wanted) / scale) ** 2)
 
 
-def effector_error(
-    name: str, chains: Chains, settings: ModelSettings, y, wanted, after: Pose, window: Windows
-):
+def effector_error(name: str, chains: Chains, settings: ModelSettings, y, wanted, after: Pose, window: Windows):
     """The third term of eq. 7.5 without its lambda: mean square distance, m^2.
 
     Of a limb that of its wrist or toe in `after` from where the description has it in frame n + 1; else `missed_ends`.
@@ -100,14 +95,17 @@ class Networks:
         held = np.zeros(len(self.lengths), bool) if held is None else held
         held = np.repeat(held, np.array(self.lengths) - 1)
         told = single_steps(recorded)
-        beside = self._beside(told) if config.linear_start and config.start_noise else None
+        beside = None  # the same steps from poses beside the truth
+        if config.linear_start and config.start_noise:
+            off = drawn(chains, len(told.pose.root), config.start_noise, config.seed)
+            beside = told._replace(pose=disturbed(chains, told.pose, *(one.astype(np.float32) for one in off)))
         for name in self.settings.networks:
             x, y, phase = step_arrays(name, chains, self.settings, told, leg_reach)
             (mean_x, scale_x), (mean_y, scale_y) = scales_of(x), scales_of(y)
             self.scales[name] = {
                 "input_mean": mean_x, "input_scale": scale_x, "output_mean": mean_y, "output_scale": scale_y,
             }
-            theta = phase_function.weights(phase, self.settings.points).astype(np.float32)
+            theta = weigh_points(phase, self.settings.points).astype(np.float32)
             alone[name] = ((x - mean_x) / scale_x, y, theta)
             if config.linear_start:
                 parts = [(x, y)]
@@ -116,11 +114,6 @@ class Networks:
                 self._sums[name] = self._sums_of(name, parts, theta, held)
         firsts = np.concatenate([[0], np.cumsum(np.array(self.lengths[:-1], int) - 1)])
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
-
-    def _beside(self, told: Steps) -> Steps:
-        """The same steps from poses beside the truth."""
-        off = drawn(self.chains, len(told.pose.root), self.config.start_noise, self.config.seed)
-        return told._replace(pose=disturbed(self.chains, told.pose, *(one.astype(np.float32) for one in off)))
 
     def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
         """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those
@@ -207,7 +200,7 @@ class Networks:
             x = network_input(name, self.chains, self.settings, pose, after, window, ARRAYS)
             phase = phase_of(name, self.chains, after, window, self.leg_reach, ARRAYS)
             x = (x - self.scales[name]["input_mean"]) / self.scales[name]["input_scale"]
-            theta = phase_function.weights(phase, self.settings.points, jnp)
+            theta = weigh_points(phase, self.settings.points, jnp)
             y = self._answer(params, name, x, theta, jax.random.fold_in(key, number))
             wanted = network_output(name, self.chains, self.settings, pose, truth, ARRAYS)
             parts[name] = joint_error(y, wanted, self.scales[name]["output_scale"])

@@ -1,4 +1,4 @@
-"""The networks as jax trains them: first weights, and what use has of them (`PhaseNetwork`)."""
+"""The networks as jax trains them: first weights, what use has of them (`PhaseNetwork`), and the arrays they run on."""
 
 from __future__ import annotations
 
@@ -127,3 +127,23 @@ def to_use(params: dict, scales: dict) -> PhaseNetwork:
     """The trained network for use; scales: input_mean, input_scale, output_mean, output_scale."""
     arrays = {name: tuple(np.asarray(one) for one in params[name]) for name in ("weights", "biases")}
     return PhaseNetwork(**arrays, **{name: np.asarray(value) for name, value in scales.items()})
+
+
+class _Arrays:
+    """`jax.numpy`, but for `take`."""
+
+    def __getattr__(self, name: str):
+        return getattr(jnp, name)
+
+    @staticmethod
+    def take(values, indices: np.ndarray, axis: int):
+        """`values` at fixed `indices` along an axis: runs of neighbours are sliced and put together."""
+        axis = axis % values.ndim
+        indices = [int(index) for index in indices]
+        starts = [i for i, index in enumerate(indices) if i == 0 or index != indices[i - 1] + 1]
+        runs = [indices[first:last] for first, last in zip(starts, [*starts[1:], len(indices)])]
+        return jnp.concatenate([jax.lax.slice_in_dim(values, r[0], r[-1] + 1, axis=axis) for r in runs], axis)
+
+
+ARRAYS = _Arrays()
+"""The array module that training gives to everything that takes one (`xp`)."""

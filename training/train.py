@@ -1,34 +1,48 @@
-"""From examples to a model: what the command and the experiments call."""
+"""From a folder of examples to a model: what `throw train` and the experiments call.
+
+The ridge of the linear start is chosen by what it is for: frames fed back on movements that regression did not see.
+"""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import jax
 import numpy as np
 
-from beyond_mocap.base.errors import InputError
-from beyond_mocap.throws.networks.example import Example
+from beyond_mocap.base.errors import Cancelled, InputError
+from beyond_mocap.cli.outputs import check_outputs
+from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.files.bvh import bvh
+from beyond_mocap.motion.skeleton import Skeleton
+from beyond_mocap.throws.network_npz import write_model
+from beyond_mocap.throws.networks.chains import chains_of
+from beyond_mocap.throws.networks.example import Example, describe
+from beyond_mocap.throws.networks.generate import Options, generate
 from beyond_mocap.throws.networks.limits import JointLimits, learn
 from beyond_mocap.throws.networks.model import ThrowModel
 from beyond_mocap.throws.networks.training_set import leg_reach, reference_of, shared_chains, with_mirrors
+from beyond_mocap.throws.throw_examples import examples_in
 
-from .config import TrainingConfig
-from .fit import Trained, fit
+from .config import TrainingConfig, read_config
+from .fit import Trained, check_checkpoint, checkpoint_path, fit
 from .hierarchy import Networks
-from .networks import to_use
+from .networks import RIDGES, to_use
 from .recordings import recordings
-from .ridge import held_out, least_astray
+
+_RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
+_FOURTH = 4
+_MOST = 8  # movements that are generated for each ridge
+_ALIKE = 1.05  # so much more than the least still counts as the least: of those, the largest ridge is the safest
+READING = 0.05
+"""Share of the progress that reading the folder is."""
 
 
 def train(
-    examples: Sequence[Example],
-    config: TrainingConfig,
-    *,
-    checkpoint: Path | None = None,
-    resume: bool = False,
-    minutes: float | None = None,
-    progress: Callable[[float, str], None] = lambda fraction, text: None,
+    examples: Sequence[Example], config: TrainingConfig, *, checkpoint: Path | None = None, resume: bool = False,
+    minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> ThrowModel:
     """A model trained on examples of one skeleton, at the config's rate.
@@ -48,14 +62,10 @@ def train(
 
     def model_of(params: dict, line: str) -> ThrowModel:
         return ThrowModel(
-            settings=settings,
-            skeleton=chains.skeleton,
-            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks},
-            leg_reach=reach,
+            settings=settings, skeleton=chains.skeleton,
+            networks={name: to_use(params[name], problem.scales[name]) for name in settings.networks}, leg_reach=reach,
             examples=spread_over(examples, config.examples),
-            stature=float(np.mean([example.stature for example in examples])),
-            joint_limits=limits,
-            reference=reference,
+            stature=float(np.mean([example.stature for example in examples])), joint_limits=limits, reference=reference,
             trained_on=line,
         )
 
@@ -96,3 +106,106 @@ def _line(examples: Sequence[Example], trained: Trained) -> str:
     whom = f"{len(examples)} examples of {subjects} subject{'s' if subjects > 1 else ''}, {frames} frames"
     loss = f", loss {trained.losses[-1]:.4f}" if trained.losses else ""
     return f"{whom}; {trained.epochs} epochs{loss}"
+
+
+def held_out(examples: Sequence[Example]) -> np.ndarray:
+    """Which examples (N,) are left out while the ridge is chosen: all of the last subject, or a fourth of one
+    subject's; none of three examples or fewer. An example's mirror image goes with it."""
+    subjects = list(dict.fromkeys(example.subject for example in examples))
+    if len(subjects) > 1:
+        return np.array([example.subject == subjects[-1] for example in examples])
+    groups = list(dict.fromkeys((example.name, round(example.release, 6)) for example in examples))
+    if len(groups) < _FOURTH:
+        return np.zeros(len(examples), bool)
+    out = set(groups[_FOURTH - 1 :: _FOURTH])
+    return np.array([(example.name, round(example.release, 6)) in out for example in examples])
+
+
+def least_astray(
+    problem: Networks, held: Sequence[Example], model_of: Callable[[dict, str], ThrowModel],
+    cancelled: Callable[[], bool] = lambda: False,
+) -> float:
+    """Of `RIDGES` the one whose networks keep hands and feet nearest to where they are wanted, on movements of which
+    regression saw nothing. model_of: a model out of parameters and a line. The largest where nothing is held out."""
+    if not held:
+        return RIDGES[-1]
+    asked = [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MOST).round().astype(int))]
+    off = []
+    for ridge in RIDGES:
+        if cancelled():
+            raise Cancelled("stopped while the start was chosen")
+        model = model_of(problem.started(jax.random.key(0), problem.linear(ridge, whole=False)), "")
+        off.append(np.mean([_off(model, example) for example in asked]))
+    good = [ridge for ridge, one in zip(RIDGES, off) if one <= _ALIKE * min(off)]
+    return good[-1] if good else RIDGES[-1]
+
+
+def _off(model: ThrowModel, example: Example) -> float:
+    """Metres by which what the networks say misses, mean over frames, hands and feet; a body that is lost is far
+    off."""
+    try:
+        with np.errstate(all="ignore"):
+            made = generate(model, describe(example), options=_RAW)
+    except InputError:
+        return np.inf
+    return float(np.mean(made.raw))
+
+
+def train_folder(options, told: Told) -> None:
+    """Reads the folder, trains, and writes the model and its checkpoint; options: of `throw train`."""
+    begun = time.perf_counter()
+    config = read_config(options.config, seed=options.seed, epochs=options.epochs, action=options.action)
+    kept = checkpoint_path(options.out)
+    check_outputs(options.out, kept, never=(options.config, options.skeleton))
+    if options.resume:
+        check_checkpoint(kept)
+    examples = _examples(options, config, told)
+
+    def progress(share: float, text: str) -> None:
+        told.progress(READING + (1.0 - READING) * share, text)
+
+    model = train(
+        examples, config, checkpoint=kept, resume=options.resume, minutes=options.minutes,
+        progress=progress, cancelled=told.cancelled,
+    )
+    write_model(model, options.out, half=options.half)
+    told.end()
+    weights = sum(network.parameters for network in model.networks.values())
+    seconds = time.perf_counter() - begun
+    print(f"{options.out}: {model.trained_on}; {len(model.networks)} networks, {weights} weights, {seconds:.0f} s")
+
+
+def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
+    """The folder's examples of the asked subjects, on one skeleton: the given one, else that of the first."""
+    skeleton = _skeleton(options.skeleton) if options.skeleton else None
+    found = _read(options, config, told, skeleton)
+    first = found[0].motion.skeleton
+    if skeleton is None and not all(example.motion.skeleton.same_bones(first) for example in found):
+        found = _read(options, config, told, first)
+    return found
+
+
+def _skeleton(path: Path) -> Skeleton:
+    """Whose bones the model is to have. InputError that names the file where it lacks hands or feet."""
+    skeleton = bvh.read(path).motion.skeleton
+    try:
+        chains_of(skeleton)
+    except InputError as error:
+        raise InputError(path, str(error)) from None
+    return skeleton
+
+
+def _read(options, config: TrainingConfig, told: Told, skeleton) -> list[Example]:
+    def progress(share: float, text: str) -> None:
+        told.progress(READING * share, text)
+
+    settings = config.settings
+    found = examples_in(
+        options.folder, settings.action, settings.fps, skeleton, told.note, progress=progress, cancelled=told.cancelled,
+    )
+    chosen = [example for example in found if not options.subject or example.subject in options.subject]
+    there = sorted({example.subject for example in found})
+    for name in options.subject:
+        if name not in there:
+            raise InputError("--subject", name, f"one of {', '.join(there)}", f"see {options.folder}")
+    return chosen

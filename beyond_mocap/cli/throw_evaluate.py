@@ -29,8 +29,8 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..files.whole import atomic_write
     from ..throws.evaluate_throws import FULL, RAW, evaluate_throws, some_of_each
     from ..throws.network_npz import read_model
-    from ..throws.report.page import throws_page
-    from ..throws.throw_examples import TABLE_NAME
+    from ..throws.throw_records import TABLE_NAME
+    from ..throws.throws_page import throws_page
 
     begun = time.perf_counter()
     check_outputs(options.report, options.html, never=(options.model, options.examples / TABLE_NAME))

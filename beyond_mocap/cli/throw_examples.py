@@ -23,7 +23,7 @@ def add(verbs):
 def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`throw examples`: makes them and writes them."""
     from ..throws.planted_examples import write_planted
-    from ..throws.throw_examples import TABLE_NAME
+    from ..throws.throw_records import TABLE_NAME
 
     begun = time.perf_counter()
     count = write_planted(options.out, options.action, options.subjects, count=options.throws, seed=options.seed,

@@ -100,7 +100,7 @@ def _place(text: str) -> tuple[float, ...]:
 def _model(options):
     """The model asked for; without one that of the limb's action which comes with the project."""
     if options.model is None:
-        from ..throws.throw import shipped_model
+        from ..throws.network_npz import shipped_model
 
         kicks = options.ball_place is not None or (options.limb or "").endswith("foot")
         return shipped_model("kick" if kicks else "throw")
@@ -125,7 +125,7 @@ def _skeleton(options, player):
 
 
 def _order(options, player):
-    from ..throws.throw import Order
+    from ..throws.throw_order import Order
 
     over = options.over
     if player is not None and not (options.start or options.over or options.ball_place):
@@ -200,7 +200,7 @@ class _Player:
         """The throw within the player's motion, and lines for people."""
         from ..throws.join_throw import join_throw, trim_waiting
         from ..throws.run_up import EDGE, construct_run_up
-        from ..throws.throw import within
+        from ..throws.throw_order import within
 
         motion, release = trim_waiting(thrown.motion, thrown.release, EDGE)
         first = round((thrown.release - release) * thrown.motion.fps)

@@ -32,7 +32,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if options.out.suffix.lower() != ".npz":
         raise InputError(options.out, "no file of weights", "a name ending in .npz", "choose another ending")
     _require_training()
-    from training.command import train_folder
+    from training.train import train_folder
 
     train_folder(options, told)
 

@@ -1,7 +1,7 @@
 """A way to go, planned ahead: how fast, where to, facing where, and in step with what.
 
 `plan` turns wanted speeds, turns and directions into the moments of a `Course`; feet (`gait.footsteps`), trunk and arms
-(`gait_trunk`) all read from it.
+in `gait` all read from it.
 """
 
 from __future__ import annotations

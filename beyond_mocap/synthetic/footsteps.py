@@ -112,11 +112,7 @@ def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int)
 
 
 def travel(
-    steps: Footsteps,
-    times: np.ndarray,
-    hip: np.ndarray,
-    heading: np.ndarray,
-    neutral: Neutral,
+    steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: Neutral,
     thigh_shank: tuple[float, float],
 ) -> FootPath:
     """The whole way of one foot at `times` (T,), given its hip joint (T, 3) and the body's heading (T,) there.
@@ -200,8 +196,7 @@ def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.nda
     side_share = np.sin(direction) ** 2
     (x0, z0, p0), (x1, z1, p1) = parts
     return (
-        ahead_share * x0 + back_share * x1,
-        ahead_share * z0 + back_share * z1 + side_share * 0.5 * (z0 + z1),
+        ahead_share * x0 + back_share * x1, ahead_share * z0 + back_share * z1 + side_share * 0.5 * (z0 + z1),
         ahead_share * p0 + 0.6 * back_share * p1 + side_share * np.radians(8.0),
     )
 
@@ -231,6 +226,17 @@ def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
     """How much (N,) metres the swinging foot has to be lifted so that toes and heel pass above the ground."""
     wanted = 0.014 * size * np.sin(np.pi * share) ** 2
     return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
+
+
+def lift_foot(rows: np.ndarray, neutral: Neutral) -> np.ndarray:
+    """An ankle's way and the foot's turn (T, 6), metres and radians, out of an adult's rows (T, 5): ahead, left,
+    raised, metres, pitch, yaw, degrees; not through the ground."""
+    scale = neutral.leg / tables.LEG
+    ahead, left, raised, pitch, yaw = rows.T
+    pitch, yaw = np.radians(pitch), np.radians(yaw)
+    up = neutral.ankle_height + raised * scale
+    up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
+    return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
 
 
 def lift_off_ground(

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.easing import quintic_step
 from ..base.time_series import hann_smooth, interpolate
 from ..motion.humanoid import identify
 from ..motion.motion import Motion
@@ -23,10 +24,9 @@ from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.retargeting.posture import Posture, hip_joints, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .course import Course, GaitStyle, plan
+from .course import Course, GaitStyle, plan, wander
 from .footsteps import Footsteps, travel
-from .gait_tables import at_speed
-from .gait_trunk import arms, trunk
+from .gait_tables import at_speed, run_share
 
 # how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
 _AHEAD, _BEHIND = 0.41, 0.72
@@ -38,17 +38,9 @@ _EASE = 0.03
 
 
 def gait(
-    speed: float | np.ndarray,
-    duration: float | None = None,
-    fps: float = 30.0,
-    skeleton: Skeleton | None = None,
-    *,
-    style: GaitStyle = GaitStyle(),
-    phase: float = 0.0,
-    turn_rate: float | np.ndarray = 0.0,
-    direction: float | np.ndarray = 0.0,
-    seed: int = 0,
-    example: Motion | None = None,
+    speed: float | np.ndarray, duration: float | None = None, fps: float = 30.0, skeleton: Skeleton | None = None, *,
+    style: GaitStyle = GaitStyle(), phase: float = 0.0, turn_rate: float | np.ndarray = 0.0,
+    direction: float | np.ndarray = 0.0, seed: int = 0, example: Motion | None = None,
 ) -> Motion:
     """A body that travels at `speed` for `duration` seconds; it begins at the origin and faces +X.
 
@@ -126,11 +118,7 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
     balance.
     """
     height = 0.8 * (neutral.leg + neutral.ankle_height)
-    shift = (
-        height
-        * interpolate(at, course.times, course.acceleration)
-        / tables.GRAVITY
-    )
+    shift = height * interpolate(at, course.times, course.acceleration) / tables.GRAVITY
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
     limit = 0.30 * neutral.leg
     return shift * np.where(size > 1e-9, limit * np.tanh(size / limit) / np.maximum(size, 1e-9), 1.0)
@@ -140,19 +128,13 @@ def posture_over(
     course: Course, steps: tuple[Footsteps, ...], neutral: Neutral, style: GaitStyle, seed: int
 ) -> Posture:
     """The posture at all moments of `course` for feet that stand as `steps` says (left, right)."""
-    above = trunk(course, neutral, style, seed)
+    above = pose_trunk(course, neutral, style, seed)
     count = len(course.times)
     rate = 1.0 / (course.times[1] - course.times[0])
     posture = Posture(
-        fps=round(rate / course.stride, 6),
-        heading=course.heading,
-        arms=arms(course, style, seed),
-        wrists=np.full((count, 2), np.radians(8.0)),
-        ankles=np.zeros((count, 2, 3)),
-        feet=np.zeros((count, 2, 3)),
-        toes=np.zeros((count, 2)),
-        knees=np.full((count, 2), np.radians(2.0)),
-        **above,
+        fps=round(rate / course.stride, 6), heading=course.heading, arms=pose_arms(course, style, seed),
+        wrists=np.full((count, 2), np.radians(8.0)), ankles=np.zeros((count, 2, 3)), feet=np.zeros((count, 2, 3)),
+        toes=np.zeros((count, 2)), knees=np.full((count, 2), np.radians(2.0)), **above,
     )
     return with_feet(posture, course.times, steps, neutral)
 
@@ -169,9 +151,7 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...],
                     thigh_shank=thigh_shank(neutral, s)) for s in (0, 1)]
     ankles = [kept_bent(paths[s].ankle, tops[:, s], times, steps[s], sum(thigh_shank(neutral, s))) for s in (0, 1)]
     feet = np.stack([np.stack([np.zeros_like(p.pitch), p.pitch, p.yaw], axis=-1) for p in paths], axis=1)
-    return posture.changed(
-        ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1)
-    )
+    return posture.changed(ankles=np.stack(ankles, axis=1), feet=feet, toes=np.stack([p.bend for p in paths], axis=1))
 
 
 def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
@@ -185,10 +165,15 @@ def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Foot
     swing."""
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
-    begin = (_straightest(steps, times) + 0.006 - _EASE) * leg
-    eased = begin + _EASE * leg * np.tanh((far - begin) / (_EASE * leg))
-    share = np.where(steps.standing(times) | (far < begin), 1.0, eased / np.maximum(far, 1e-9))
-    return hip + away * share[:, None]
+    share = ease_reach(far, (_straightest(steps, times) + 0.006 - _EASE) * leg, _EASE * leg)
+    return hip + away * np.where(steps.standing(times), 1.0, share)[:, None]
+
+
+def ease_reach(far: np.ndarray, begin: float | np.ndarray, soft: float) -> np.ndarray:
+    """Share (T,) of distances `far` (T,) m that is gone where what lies beyond `begin` m is neared softly, never more
+    than `soft` m beyond it."""
+    eased = begin + soft * np.tanh((far - begin) / soft)
+    return np.where(far < begin, 1.0, eased / np.maximum(far, 1e-9))
 
 
 def thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
@@ -210,9 +195,135 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
-    return hann_smooth(_running_max(need, width), width)
+    around = np.lib.stride_tricks.sliding_window_view(np.pad(need, width, mode="edge"), 2 * width + 1)
+    return hann_smooth(np.max(around, axis=-1), width)
 
 
-def _running_max(values: np.ndarray, width: int) -> np.ndarray:
-    padded = np.pad(values, width, mode="edge")
-    return np.max(np.lib.stride_tricks.sliding_window_view(padded, 2 * width + 1), axis=-1)
+def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:
+    """Hips, pelvis, spine and head at all moments (arrays of `Posture`)."""
+    gear, phase = course.gear, course.phase
+    scale = neutral.leg / tables.LEG
+    turn = 2.0 * np.pi * phase
+    ahead = 1.0 - 0.6 * np.sin(0.5 * course.direction) ** 2
+    idle = style.life * (1.0 - quintic_step(gear / 0.7))
+    middle = 0.5 * at_speed("duty", gear)
+    sway = scale * at_speed("sway", gear) * np.cos(turn - 2.0 * np.pi * middle) + idle * 0.014 * wander(
+        course.times, seed + 1, 6.0
+    )
+    surge = _surge(course, middle)
+    across = course.heading
+    hips = np.empty((len(gear), 3))
+    hips[:, 0] = course.path[:, 0] + surge * np.cos(across + course.direction) - sway * np.sin(across)
+    hips[:, 1] = course.path[:, 1] + surge * np.sin(across + course.direction) + sway * np.cos(across)
+    hips[:, 2] = hip_height(course, neutral, style)
+    lean = _leaning(course)
+    wobble = 1.0 + 0.06 * style.life * wander(course.times, seed + 2, 2.3)
+    angle = {
+        name: np.radians(at_speed(name, gear)) * ahead * wobble
+        for name in ("pelvis_turn", "chest_turn", "list", "tilt", "lean")
+    }
+    pelvis = np.stack(
+        [
+            angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2)
+            + 0.35 * lean[:, 0]
+            + idle * 0.02 * wander(course.times, seed + 1, 6.0),
+            angle["tilt"] + 0.35 * lean[:, 1] + np.radians(1.0) * run_share(gear) * np.cos(2.0 * turn),
+            -angle["pelvis_turn"] * np.cos(turn + 2.0 * np.pi * 0.18 * run_share(gear)),
+        ],
+        axis=-1,
+    )
+    breath = idle * np.radians(0.9) * np.sin(2.0 * np.pi * 0.24 * course.times + seed)
+    spine = np.stack(
+        [
+            -0.85 * (angle["list"] * np.cos(turn - 2.0 * np.pi * 0.2)) + 0.35 * lean[:, 0],
+            angle["lean"]
+            - angle["tilt"]
+            + style.lean
+            + 0.35 * lean[:, 1]
+            - breath
+            + 0.02 * np.sin(2.0 * turn) * run_share(gear),
+            style.twist * angle["chest_turn"] * np.cos(turn) - pelvis[:, 2],
+        ],
+        axis=-1,
+    )
+    look = np.stack([0.0 * gear, np.radians(4.0) + style.head + 0.0 * gear, 0.0 * gear], axis=-1)
+    turn_rate = np.gradient(course.heading, course.times)
+    look[:, 2] += idle * np.radians(9.0) * wander(course.times, seed + 3, 4.0) + 0.12 * np.tanh(turn_rate)
+    head = -(pelvis + spine) * np.array([0.8, 0.85, 0.95]) + look
+    return {"hips": hips, "pelvis": pelvis, "spine": spine, "head": head}
+
+
+def _surge(course: Course, middle: np.ndarray) -> np.ndarray:
+    """How far (N,) metres the hips run ahead of a steady pace: slowest over the middle of stance (braking, then
+    pushing).
+    """
+    swing = np.minimum(0.07 * course.speed, 0.16)
+    frequency = np.maximum(np.gradient(course.phase, course.times), 0.3)
+    return -swing / (4.0 * np.pi * frequency) * np.sin(4.0 * np.pi * (course.phase - middle))
+
+
+def _leaning(course: Course) -> np.ndarray:
+    """Extra lean (N, 2) of the body into its acceleration: list (right down positive... about X) and tilt (about Y),
+    radians.
+    """
+    cos, sin = np.cos(course.heading), np.sin(course.heading)
+    forward = course.acceleration[:, 0] * cos + course.acceleration[:, 1] * sin
+    left = -course.acceleration[:, 0] * sin + course.acceleration[:, 1] * cos
+    return np.stack([-0.42 * np.tanh(left / 4.5), 0.42 * np.tanh(forward / 5.0)], axis=-1)
+
+
+def hip_height(course: Course, neutral: Neutral, style: GaitStyle) -> np.ndarray:
+    """Height (N,) metres of the hip joints: over the middle of stance as the knee's flexion there says, and the
+    bounce."""
+    gear, phase = course.gear, course.phase
+    scale = neutral.leg / tables.LEG
+    knee = np.radians(at_speed("knee_mid", gear)) + style.crouch
+    half = 0.5 * neutral.leg
+    chord = 2.0 * half * np.cos(0.5 * knee)
+    ahead = at_speed("ahead", gear) * scale
+    heel_up = (
+        np.maximum(np.sin(tables.stance_pitch(np.full_like(gear, 0.5), gear)), 0.0)
+        * neutral.ball[0, 0]
+        * run_share(gear)
+    )
+    at_middle = neutral.ankle_height + heel_up + np.sqrt(chord**2 - ahead**2)
+    duty = at_speed("duty", gear)
+    step_time = 0.5 / np.maximum(np.gradient(phase, course.times), 0.3)
+    share = np.clip(2.0 * duty, 0.4, 1.0)
+    run = run_share(gear)
+    walking = scale * at_speed("bob", gear)
+    bob = (1.0 - run) * walking * np.cos(4.0 * np.pi * (phase - 0.5 * duty))
+    bob = bob + run * tables.bounce(2.0 * phase, share, step_time)
+    bob_middle = (1.0 - run) * walking + run * tables.bounce(share * 0.5, share, step_time)
+    return at_middle + style.bounce * (1.0 - 0.4 * np.sin(0.5 * course.direction) ** 2) * (bob - bob_middle)
+
+
+def pose_arms(course: Course, style: GaitStyle, seed: int) -> np.ndarray:
+    """Arms (N, 2, 5) as in `Posture`: each forward together with the other side's leg."""
+    gear = course.gear
+    run = run_share(gear)
+    less = (1.0 - 0.5 * np.sin(0.5 * course.direction) ** 2) * (1.0 - 0.4 * np.sin(course.direction) ** 2)
+    figures = {
+        n: np.radians(at_speed(n, gear))
+        for n in ("arm_swing", "arm_middle", "elbow", "elbow_swing", "abduct", "inward")
+    }
+    idle = style.life * (1.0 - quintic_step(gear / 0.7))
+    sides = []
+    for side, shift in ((0, 0.5), (1, 0.0)):
+        uneven = 1.0 + style.life * (0.08 * wander(course.times, seed + 5 + side, 2.6) + (0.04, -0.04)[side])
+        turn = 2.0 * np.pi * (course.phase - shift - 0.02 + 0.17 * run)
+        wave = np.cos(turn) * uneven * less * style.arm_swing
+        slow = idle * np.radians(2.0) * wander(course.times, seed + 7 + side, 5.0)
+        sides.append(
+            np.stack(
+                [
+                    figures["arm_middle"] + figures["arm_swing"] * wave + slow,
+                    figures["abduct"] + style.abduct - np.radians(3.0) * run * wave + 0.5 * slow,
+                    figures["inward"] + np.radians(9.0) * run * wave,
+                    figures["elbow"] + style.elbow + figures["elbow_swing"] * np.cos(turn - 0.3) * uneven * less,
+                    np.radians(18.0) * np.ones_like(gear),
+                ],
+                axis=-1,
+            )
+        )
+    return np.stack(sides, axis=1)

@@ -1,4 +1,4 @@
-"""Made touches of the ball on the run: kicks, a trap, a dribble.
+"""Synthetic touches of the ball on the run: kicks, a trap, a dribble; and key poses over time, as all moves use them.
 
 Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the
 touch). Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci
@@ -9,13 +9,17 @@ flung out.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from ..base.easing import quintic_step
+from ..base.errors import InputError
 from ..motion import quaternion
+from ..motion.humanoid import identify
 from ..motion.motion import Motion
 from ..motion.retargeting.adult import adult_skeleton
 from ..motion.retargeting.neutral import Neutral, neutral_stance
@@ -25,7 +29,6 @@ from . import gait_tables as tables
 from .course import Course, GaitStyle, plan
 from .footsteps import Footsteps, lift_off_ground
 from .gait import footsteps, kept_bent, posture_over, thigh_shank, with_feet
-from .keyed import envelope, keyed, mixed
 
 LEFT, RIGHT = 0, 1
 
@@ -68,10 +71,8 @@ _KICK_SPEEDS = ((-2.6, 2.4), (-1.4, 2.9), (-0.6, 2.8), (0.0, 1.9), (0.45, 1.3), 
 STRIKES = {
     "kick low inside": Strike(
         foot=(
-            (-0.15, -0.42, -0.14, 0.34, 45, -35, 0),
-            (0.0, 0.30, -0.11, 0.105, 2, -68, -6),
-            (0.09, 0.58, -0.08, 0.22, -4, -62, -8),
-            (0.20, 0.60, -0.09, 0.32, 0, -40, -4),
+            (-0.15, -0.42, -0.14, 0.34, 45, -35, 0), (0.0, 0.30, -0.11, 0.105, 2, -68, -6),
+            (0.09, 0.58, -0.08, 0.22, -4, -62, -8), (0.20, 0.60, -0.09, 0.32, 0, -40, -4),
         ),
         pelvis=((-0.15, 4, 4, -20), (0.0, 5, -2, 6), (0.18, 3, -4, 16)),
         spine=((-0.15, -10, 8, 24), (0.0, -9, 10, -4), (0.18, -4, 12, -16)),
@@ -84,10 +85,8 @@ STRIKES = {
     ),
     "kick low top": Strike(
         foot=(
-            (-0.14, -0.52, -0.16, 0.50, 88, -8, 0),
-            (0.0, 0.24, -0.09, 0.175, 36, -10, 6),
-            (0.07, 0.66, 0.02, 0.42, 18, 2, 4),
-            (0.17, 0.70, 0.10, 0.72, -10, 10, 0),
+            (-0.14, -0.52, -0.16, 0.50, 88, -8, 0), (0.0, 0.24, -0.09, 0.175, 36, -10, 6),
+            (0.07, 0.66, 0.02, 0.42, 18, 2, 4), (0.17, 0.70, 0.10, 0.72, -10, 10, 0),
             (0.30, 0.56, 0.06, 0.48, -2, 6, 0),
         ),
         pelvis=((-0.14, 4, 6, -32), (0.0, 8, -6, 2), (0.17, 4, -12, 26)),
@@ -101,10 +100,8 @@ STRIKES = {
     ),
     "receive foot low inside": Strike(
         foot=(
-            (-0.16, 0.26, -0.14, 0.16, 0, -48, 0),
-            (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
-            (0.16, 0.10, -0.15, 0.13, 2, -66, -4),
-            (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
+            (-0.16, 0.26, -0.14, 0.16, 0, -48, 0), (0.0, 0.34, -0.14, 0.15, -4, -70, -6),
+            (0.16, 0.10, -0.15, 0.13, 2, -66, -4), (0.26, 0.10, -0.13, 0.11, 2, -45, 0),
         ),
         pelvis=((-0.16, 4, 2, -4), (0.0, 5, 0, 2), (0.16, 4, 2, -10)),
         spine=((-0.16, -6, 9, 4), (0.0, -7, 12, -2), (0.16, -5, 14, 6)),
@@ -131,14 +128,8 @@ _LANDING = 0.1
 
 
 def strike(
-    kind: str,
-    skeleton: Skeleton | None = None,
-    fps: float = 60.0,
-    speed: float = 1.0,
-    seed: int = 0,
-    *,
-    at_speed: float | None = None,
-    example: Motion | None = None,
+    kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0, *,
+    at_speed: float | None = None, example: Motion | None = None,
 ) -> Gesture:
     """The right foot meets the ball after an approach and runs on: `kind` is one of STRIKES; facing and travelling +X.
 
@@ -168,11 +159,9 @@ def _on_the_run(recipe: Strike, speed: float) -> Strike:
     duty = float(tables.at_speed("duty", speed))
     at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
     return replace(
-        recipe,
-        speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
+        recipe, speeds=tuple((time, part * speed) for time, part in _RUNNING_SPEEDS),
         pace=recipe.pace + (_RUNNING_PACE - recipe.pace) * share,
-        at=recipe.at + (max(at, recipe.at) - recipe.at) * share,
-        fling=1.0 - 0.5 * share,
+        at=recipe.at + (max(at, recipe.at) - recipe.at) * share, fling=1.0 - 0.5 * share,
     )
 
 
@@ -212,9 +201,7 @@ def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Stri
     return _kicking_foot(posture, course, steps[RIGHT], key=key, rows=recipe.foot, neutral=neutral)
 
 
-def _kicking_foot(
-    posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral
-) -> Posture:
+def _kicking_foot(posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral) -> Posture:
     """The right foot's swing around `key` seconds led through the rows of a Strike; its ends stay as they were."""
     swing = _swing_around(steps, key)
     scale = neutral.leg / tables.LEG
@@ -268,3 +255,61 @@ def dribble(
     ankles[:, RIGHT, 2] += touch * lift_off_ground(ankles[:, RIGHT, 2], feet[:, RIGHT, 1], neutral)
     posture = posture.changed(ankles=ankles, feet=feet)
     return to_motion(posture.frames(course.asked), neutral)
+
+
+def keyed(rows, times: np.ndarray) -> np.ndarray:
+    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the
+    last."""
+    first, last, curve = _curve(tuple(map(tuple, rows)))
+    return curve(np.clip(times, first, last))
+
+
+def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
+    """`keyed` without corners in the speed: (T, values) behind a Gaussian of `frames` standard deviation."""
+    from scipy.ndimage import gaussian_filter1d
+
+    return gaussian_filter1d(keyed(rows, times), frames, axis=0, mode="nearest")
+
+
+def begin_plan(style, neutral: Neutral, times: np.ndarray, frames: float) -> tuple:
+    """What planned throws and kicks have in common, at `times` (T,): how tables are read, corners rounded over `frames`
+    (rows -> (T, values)); pelvis and spine (T, 3) and arms (T, 2, 5) as in a `Posture`; metres of the hips' height."""
+
+    def curve(rows) -> np.ndarray:
+        return keyed_rounded(rows, times, frames)
+
+    arms = np.zeros((len(times), 2, 5))
+    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(curve(style.right_arm)), np.radians(curve(style.left_arm))
+    body = identify(neutral.skeleton)
+    height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
+    return curve, np.radians(curve(style.pelvis)), np.radians(curve(style.spine)), arms, height
+
+
+def choose_style(
+    action: str, side: str, limb: str, *, style, styles: Mapping, speed: float, speeds: tuple[float, float]
+):
+    """`style`, or that of `styles` with its name, for a throw or kick with the left or right limb at `speed` m/s.
+    InputError for an unknown one, another side, a speed beyond `speeds` (lowest, highest)."""
+    how = style if isinstance(style, type(next(iter(styles.values())))) else styles.get(style)
+    if side not in ("left", "right") or how is None:
+        raise InputError(action, f"{style} with the {side} {limb}", f"left or right, {' or '.join(styles)}")
+    if not speeds[0] <= speed <= speeds[1]:
+        raise InputError(action, f"{speed:g} m/s", f"{speeds[0]:g} to {speeds[1]:g} m/s")
+    return how
+
+
+@lru_cache(maxsize=256)
+def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
+    """First and last time and the curve of a table; kept, as a made movement is planned again and again."""
+    table = np.array(rows, dtype=float)
+    return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
+
+
+def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
+    """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
+    return quintic_step((times - begin) / (full - begin)) * (1.0 - quintic_step((times - fade) / (end - fade)))
+
+
+def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    weight = weight.reshape(weight.shape + (1,) * (a.ndim - 1))
+    return a * (1.0 - weight) + b * weight

@@ -4,7 +4,7 @@ Instants, angles and rates of the instep kick follow Lees and Nolan 1998 (J. Spo
 Ikegami and Sakurai 2002 (Med. Sci. Sports Exerc. 34, 2028-2036) and Kellis and Katis 2007 (J. Sports Sci. Med. 6,
 154-165): an approach of 3 m/s at some 35 degrees, the foot planted beside the ball 0.11 s before the contact, the
 pelvis turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees a second, the
-trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `throws.made_kicks`.
+trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `throws.letting_go`.
 """
 
 from __future__ import annotations
@@ -22,9 +22,8 @@ from ..motion.motion import Motion, at_frames, place, pose_kinematics
 from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, hip_joints, to_motion
 from . import gait_tables as tables
-from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
-from .keyed import keyed_rounded
+from .footsteps import lift_foot
+from .gestures import RIGHT, begin_plan
 
 BEFORE, AFTER = 1.5, 1.3
 """Seconds of a hard kick before and after the contact; slower ones take longer."""
@@ -82,15 +81,13 @@ _INSTEP = KickStyle(
     ),
     left_arm=(
         (-1.5, 2, 10, 12, 18), (-1.0, -18, 14, 12, 30), (-0.65, 26, 18, 18, 45), (-0.4, 0, 50, 8, 32),
-        (-0.16, -30, 84, 0, 18),
-        (-0.03, 16, 72, 14, 26), (0.12, 50, 40, 32, 42), (0.3, 44, 28, 30, 46), (0.7, 12, 20, 16, 34),
-        (1.3, 2, 10, 12, 18),
+        (-0.16, -30, 84, 0, 18), (-0.03, 16, 72, 14, 26), (0.12, 50, 40, 32, 42), (0.3, 44, 28, 30, 46),
+        (0.7, 12, 20, 16, 34), (1.3, 2, 10, 12, 18),
     ),
     right_arm=(
         (-1.5, 2, 10, 12, 18), (-1.0, 22, 12, 16, 45), (-0.65, -22, 18, 10, 38), (-0.35, 14, 26, 16, 46),
-        (-0.16, 34, 30, 20, 46),
-        (0.0, -20, 44, 8, 32), (0.14, -40, 42, 0, 24), (0.35, -24, 32, 8, 28), (0.7, -4, 20, 12, 28),
-        (1.3, 2, 10, 12, 18),
+        (-0.16, 34, 30, 20, 46), (0.0, -20, 44, 8, 32), (0.14, -40, 42, 0, 24), (0.35, -24, 32, 8, 28),
+        (0.7, -4, 20, 12, 28), (1.3, 2, 10, 12, 18),
     ),
     hips=(
         (-0.11, -0.19, 0.15, 0.11), (0.0, 0.0, 0.0, 0.09), (0.1, 0.18, -0.05, 0.055), (0.25, 0.42, -0.08, 0.05),
@@ -118,15 +115,13 @@ _INSIDE = KickStyle(
     ),
     left_arm=(
         (-1.5, 2, 10, 12, 18), (-1.0, -14, 14, 12, 28), (-0.65, 20, 18, 18, 42), (-0.4, 0, 40, 8, 34),
-        (-0.16, -18, 62, 2, 26),
-        (-0.03, 10, 56, 12, 30), (0.12, 32, 36, 24, 40), (0.3, 28, 26, 24, 42), (0.7, 8, 18, 14, 30),
-        (1.3, 2, 10, 12, 18),
+        (-0.16, -18, 62, 2, 26), (-0.03, 10, 56, 12, 30), (0.12, 32, 36, 24, 40), (0.3, 28, 26, 24, 42),
+        (0.7, 8, 18, 14, 30), (1.3, 2, 10, 12, 18),
     ),
     right_arm=(
         (-1.5, 2, 10, 12, 18), (-1.0, 18, 12, 16, 42), (-0.65, -18, 18, 10, 36), (-0.35, 12, 24, 16, 42),
-        (-0.16, 24, 26, 18, 42),
-        (0.0, -10, 36, 10, 32), (0.14, -22, 34, 6, 28), (0.35, -12, 26, 10, 28), (0.7, 0, 18, 12, 26),
-        (1.3, 2, 10, 12, 18),
+        (-0.16, 24, 26, 18, 42), (0.0, -10, 36, 10, 32), (0.14, -22, 34, 6, 28), (0.35, -12, 26, 10, 28),
+        (0.7, 0, 18, 12, 26), (1.3, 2, 10, 12, 18),
     ),
     hips=(
         (-0.11, -0.17, 0.10, 0.10), (0.0, 0.0, 0.0, 0.09), (0.1, 0.15, -0.04, 0.07), (0.25, 0.34, -0.07, 0.06),
@@ -150,7 +145,10 @@ def kicked(
     foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
     it. loft: degrees by which its toes point less down there. fps: frames per second.
     """
-    plan = _planned(style, neutral, foot, lift=lift, loft=loft, first=-BEFORE, last=AFTER)
+    times = np.arange(int(round((AFTER + BEFORE) * _PLAN)) + 1) / _PLAN - BEFORE
+    posture, curve = _upright(style, neutral, times)
+    plan = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
+    plan = mirror(plan) if foot == "left" else plan
     seconds = np.arange(int(np.floor((len(plan) - 1) / _PLAN / rate * fps + 1e-6)) + 1) / fps
     root, rotations = at_frames(plan, seconds * rate * _PLAN)
     return place(Motion(plan.skeleton, root, rotations, fps), turn)
@@ -176,44 +174,20 @@ def contact(
     return line[:, 1], 0.5 * _PLAN * (line[:, 2] - line[:, 0])
 
 
-def _planned(style, neutral: Neutral, foot: str, lift: float, loft: float, first: float, last: float) -> Motion:
-    """The kick between two seconds, finely."""
-    times = np.arange(int(round((last - first) * _PLAN)) + 1) / _PLAN + first
-    posture, curve = _upright(style, neutral, times)
-    motion = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
-    return mirror(motion) if foot == "left" else motion
-
-
 def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Posture, Callable]:
     """The kick's posture at the planning rate, but for the way of the leg that swings; and how its tables are read."""
-    scale = neutral.leg / tables.LEG
-
-    def curve(rows) -> np.ndarray:
-        return keyed_rounded(rows, times, _ROUND * _PLAN)
-
     nothing = np.zeros_like(times)
-    pelvis, spine = np.radians(curve(style.pelvis)), np.radians(curve(style.spine))
-    body = identify(neutral.skeleton)
-    height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
+    curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
     falls = _footfalls(style)
-    way = curve(_hips(style, falls)) * scale
-    arms, wrists = np.zeros((len(times), 2, 5)), np.zeros((len(times), 2)) + 0.1
-    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(curve(style.right_arm)), np.radians(curve(style.left_arm))
-    feet = [_foot(curve(rows), neutral, scale, side) for side, rows in enumerate(_steps(style, falls))]
+    way = curve(_hips(style, falls)) * (neutral.leg / tables.LEG)
+    feet = [_foot(curve(rows), neutral, side) for side, rows in enumerate(_steps(style, falls))]
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.1, 1.1)
     nod = -0.4 * (pelvis[:, 1] + spine[:, 1]) + np.radians(curve(_NOD)[:, 0])
     posture = Posture(
-        fps=_PLAN,
-        hips=np.stack([way[:, 0], way[:, 1], height - way[:, 2]], axis=-1),
-        heading=nothing,
-        pelvis=pelvis,
-        spine=spine,
-        head=np.stack([-0.6 * spine[:, 0] - 0.6 * pelvis[:, 0], nod, look], axis=-1),
-        arms=arms,
-        wrists=wrists,
-        ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
-        feet=np.stack([foot[:, 3:6] for foot in feet], axis=1),
-        toes=np.stack([foot[:, 6] for foot in feet], axis=-1),
+        fps=_PLAN, hips=np.stack([way[:, 0], way[:, 1], height - way[:, 2]], axis=-1), heading=nothing, pelvis=pelvis,
+        spine=spine, head=np.stack([-0.6 * spine[:, 0] - 0.6 * pelvis[:, 0], nod, look], axis=-1), arms=arms,
+        wrists=np.full((len(times), 2), 0.1), ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
+        feet=np.stack([foot[:, 3:6] for foot in feet], axis=1), toes=np.stack([foot[:, 6] for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )
     return posture, curve
@@ -288,18 +262,17 @@ def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: fl
     )  # fmt: skip
 
 
-def _foot(rows: np.ndarray, neutral: Neutral, scale: float, side: int) -> np.ndarray:
+def _foot(rows: np.ndarray, neutral: Neutral, side: int) -> np.ndarray:
     """An ankle's way, the foot's turn and its toes (T, 7) out of rows (T, 5). A heel that rises turns about the ball of
     the foot, which stays."""
-    ahead, left, raised, pitch, yaw = rows.T
-    pitch, yaw = np.radians(pitch), np.radians(yaw)
-    up = neutral.ankle_height + raised * scale
-    up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
+    foot = lift_foot(rows, neutral)
+    pitch, yaw = foot[:, 4], foot[:, 5]
     length, height = neutral.ball[side, 0], -neutral.ball[side, 2]
     rolled = (length * (1.0 - np.cos(pitch)) + height * np.sin(pitch)) * (pitch > 0.0)
-    x, y = ahead * scale + rolled * np.cos(yaw), left * scale + rolled * np.sin(yaw)
-    toes = np.clip(pitch, 0.0, 0.6) * np.clip(1.0 - 8.0 * raised, 0.0, 1.0)
-    return np.stack([x, y, up, np.zeros_like(up), pitch, yaw, toes], axis=-1)
+    foot[:, 0] += rolled * np.cos(yaw)
+    foot[:, 1] += rolled * np.sin(yaw)
+    toes = np.clip(pitch, 0.0, 0.6) * np.clip(1.0 - 8.0 * rows[:, 2], 0.0, 1.0)
+    return np.column_stack([foot, toes])
 
 
 def _swung(

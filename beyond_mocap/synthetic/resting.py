@@ -10,7 +10,7 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
-from ..motion.humanoid import Humanoid, identify
+from ..motion.humanoid import identify
 from ..motion.motion import pose_kinematics
 from ..motion.retargeting.neutral import Neutral
 from ..motion.retargeting.posture import Posture, to_motion
@@ -98,31 +98,25 @@ def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
 def thickness(skeleton: Skeleton) -> np.ndarray:
     """(J,) m from each joint to the skin."""
     body = identify(skeleton)
+    parts = [("chest", joint) for joint in body.spine]
+    parts += [(role, getattr(limb, role)) for limb in (body.left, body.right) for role in THICKNESS
+              if hasattr(limb, role)]  # fmt: skip
     out = np.full(len(skeleton), _OTHERS)
-    for role, joint in _parts(body):
+    for role, joint in (*parts, ("neck", body.neck), ("head", body.head), ("hips", body.hips)):
         if joint is not None:
             out[joint] = THICKNESS[role]
     return out
 
 
-def _parts(body: Humanoid):
-    yield from ((("chest", joint) for joint in body.spine))
-    for limb in (body.left, body.right):
-        yield from ((role, getattr(limb, role)) for role in THICKNESS if hasattr(limb, role))
-    yield from (("neck", body.neck), ("head", body.head), ("hips", body.hips))
-
-
 # degrees: flexion, abduction, inward turn and elbow of the lower and the upper arm; metres for an adult: ankles ahead
 # of the hips, along the body and above their middle; degrees: roll to the front, bend of spine and head
 _LANDING = {
-    "arms": ((150, 0, 0, 18), (140, 6, 10, 30)),
-    "ankles": ((0.12, 0.74, -0.12), (0.22, 0.62, -0.02)),
-    "roll": 8.0, "spine": (6.0, -4.0), "head": (4.0, 10.0),
+    "arms": ((150, 0, 0, 18), (140, 6, 10, 30)), "ankles": ((0.12, 0.74, -0.12), (0.22, 0.62, -0.02)), "roll": 8.0,
+    "spine": (6.0, -4.0), "head": (4.0, 10.0),
 }
 _LYING = {
-    "arms": ((160, 10, 0, 50), (88, -4, 22, 70)),
-    "ankles": ((0.10, 0.62, -0.13), (0.20, 0.52, -0.07)),
-    "roll": 22.0, "spine": (14.0, 0.0), "head": (10.0, 6.0),
+    "arms": ((160, 10, 0, 50), (88, -4, 22, 70)), "ankles": ((0.10, 0.62, -0.13), (0.20, 0.52, -0.07)), "roll": 22.0,
+    "spine": (14.0, 0.0), "head": (10.0, 6.0),
 }
 # degrees by which the trunk may slope up to the shoulder, and the lower arm be drawn in, for the body to lie low
 _SLOPES, _DRAWN_IN = np.meshgrid(np.arange(-6.0, 22.0, 4.0), np.arange(-5.0, 46.0, 10.0))
@@ -161,8 +155,7 @@ def _side_posture(table: dict, neutral: Neutral, left: bool) -> Posture:
     one = np.ones((count, 1))
     return Posture(
         fps=30.0, hips=hips, heading=np.zeros(count),
-        pelvis=quaternion.to_rotation_vector(quaternion.multiply(roll, side_on)),
-        spine=one * [sign * bend, tilt, 0.0], head=one * [sign * side_nod, nod, 0.0],
-        arms=arms, wrists=np.zeros((count, 2)), ankles=ankles, feet=feet, toes=np.zeros((count, 2)),
-        knees=np.zeros((count, 2)),
+        pelvis=quaternion.to_rotation_vector(quaternion.multiply(roll, side_on)), spine=one * [sign * bend, tilt, 0.0],
+        head=one * [sign * side_nod, nod, 0.0], arms=arms, wrists=np.zeros((count, 2)), ankles=ankles, feet=feet,
+        toes=np.zeros((count, 2)), knees=np.zeros((count, 2)),
     )

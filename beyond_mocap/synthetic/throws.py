@@ -4,7 +4,8 @@ Instants, angles and rates of the hard overarm throw follow Dillman, Fleisig and
 Ther. 18, 402-408) and Fleisig, Barrentine, Zheng, Escamilla and Andrews 1999 (J. Biomech. 32, 1371-1375): foot down
 0.15 s before release with the upper arm level, pelvis then trunk turning at some 600 and 1200 degrees a second, the arm
 turned out by 170 degrees 0.03 s before release, the elbow at 25 degrees as the ball leaves. A throw is aimed as people
-aim: the body turns to the target, and the ball leaves a little earlier or later in the swing.
+aim: the body turns to the target, and the ball leaves a little earlier or later in the swing. `grip_of` says where a
+hand holds a ball, between the fingers on the palm's side, on any humanoid skeleton.
 """
 
 from __future__ import annotations
@@ -23,12 +24,9 @@ from ..motion.retargeting.neutral import Neutral, neutral_stance
 from ..motion.retargeting.posture import Posture, to_motion
 from ..motion.skeleton import Skeleton
 from . import gait_tables as tables
-from .footsteps import lift_off_ground
-from .gestures import LEFT, RIGHT
-from .grip import grip_in
-from .keyed import keyed_rounded
+from .footsteps import lift_foot
+from .gestures import RIGHT, begin_plan, choose_style
 
-GRAVITY = 9.81  # m/s^2
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
 SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
@@ -36,6 +34,9 @@ _PLAN = 480.0  # frames a second at which a throw is planned
 _ROUND = 0.007  # s over which corners of the tables are rounded
 _EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball may leave
 _ROUNDS = 12
+_AHEAD, _DOWN = 0.012, 0.105  # metres of an adult whose hand hangs: thumb's side, towards the fingertips
+USUAL_GRIP = 0.036
+"""Metres from the palm's middle to the centre of a baseball; larger balls lie further out by their radius."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +99,7 @@ _OVERARM = ThrowStyle(
     ),
 )  # fmt: skip
 _SIDEARM = replace(
-    _OVERARM,
-    spine=tuple((t, 0.15 * a, b, c) for t, a, b, c in _OVERARM.spine),
+    _OVERARM, spine=tuple((t, 0.15 * a, b, c) for t, a, b, c in _OVERARM.spine),
     right_arm=tuple((t, a, min(b, 84), c, e) for t, a, b, c, e in _OVERARM.right_arm),
 )
 STYLES = {"overarm": _OVERARM, "sidearm": _SIDEARM}
@@ -122,12 +122,8 @@ class Throw:
 
 
 def throw(
-    target: tuple[float, float, float] = (18.0, 0.0, 1.0),
-    speed: float = 25.0,
-    arm: str = "right",
-    style: str | ThrowStyle = "overarm",
-    skeleton: Skeleton | None = None,
-    fps: float = 120.0,
+    target: tuple[float, float, float] = (18.0, 0.0, 1.0), speed: float = 25.0, arm: str = "right",
+    style: str | ThrowStyle = "overarm", skeleton: Skeleton | None = None, fps: float = 120.0,
 ) -> Throw:
     """A throw out of standing at the origin, such that a ball without air flies through `target` (3,) metres.
 
@@ -135,11 +131,7 @@ def throw(
     adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown
     arm or style, a body without hands.
     """
-    how = style if isinstance(style, ThrowStyle) else STYLES.get(style)
-    if arm not in ("left", "right") or how is None:
-        raise InputError("throw", f"{style} with the {arm} arm", f"left or right, {' or '.join(STYLES)}")
-    if not SLOWEST <= speed <= FASTEST:
-        raise InputError("throw", f"{speed:g} m/s", f"{SLOWEST:g} to {FASTEST:g} m/s")
+    how = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)
     release, rate, turn = _aimed(swing, np.asarray(target, dtype=float), speed)
@@ -189,7 +181,8 @@ def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, floa
         off = []
         for instant in instants:
             spot, velocity = swing.released(instant)
-            off.append(_elevation(velocity) - _wanted_elevation(turned - spot, speed))
+            rises = float(np.arctan2(velocity[2], np.hypot(velocity[0], velocity[1])))
+            off.append(rises - _wanted_elevation(turned - spot, speed))
         at = _first_zero(instants, np.array(off), speed)
         spot, velocity = swing.released(at)
         rate = speed / float(np.linalg.norm(velocity))
@@ -209,59 +202,49 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
     return float(zeros[np.argmin(np.abs(zeros))])
 
 
-def _elevation(velocity: np.ndarray) -> float:
-    return float(np.arctan2(velocity[2], np.hypot(velocity[0], velocity[1])))
-
-
 def _wanted_elevation(way: np.ndarray, speed: float) -> float:
     """Elevation (radians) of the flatter arc without air that covers `way` (3,) metres; InputError where none does."""
     level, up = float(np.hypot(way[0], way[1])), float(way[2])
-    inside = speed**4 - GRAVITY * (GRAVITY * level**2 + 2.0 * up * speed**2)
+    inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
         raise InputError("throw", "a target out of reach", f"one that {speed:g} m/s reach", "throw faster or nearer")
-    return float(np.arctan2(speed**2 - np.sqrt(inside), GRAVITY * level))
+    return float(np.arctan2(speed**2 - np.sqrt(inside), tables.GRAVITY * level))
 
 
 def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
     """The throw's posture at the planning rate."""
     times = np.arange(int(round((BEFORE + AFTER) * _PLAN)) + 1) / _PLAN - BEFORE
-    scale = neutral.leg / tables.LEG
-
-    def curve(rows) -> np.ndarray:
-        return keyed_rounded(rows, times, _ROUND * _PLAN)
-
     nothing = np.zeros_like(times)
-    body = identify(neutral.skeleton)
-    height = 0.5 * float(neutral.positions[body.left.upper_leg, 2] + neutral.positions[body.right.upper_leg, 2])
-    way = curve(style.hips) * scale
-    pelvis, spine = np.radians(curve(style.pelvis)), np.radians(curve(style.spine))
-    arms = np.zeros((len(times), 2, 5))
-    arms[:, RIGHT, :4], arms[:, LEFT, :4] = np.radians(curve(style.right_arm)), np.radians(curve(style.left_arm))
+    curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
+    way = curve(style.hips) * (neutral.leg / tables.LEG)
     forearm = np.radians(curve(style.forearm))
     arms[:, RIGHT, 4] = forearm[:, 0]
-    feet = [_foot(curve(rows), neutral, scale) for rows in (style.left_foot, style.right_foot)]
+    feet = [lift_foot(curve(rows), neutral) for rows in (style.left_foot, style.right_foot)]
     look = np.clip(-(pelvis[:, 2] + spine[:, 2]), -1.2, 1.2)
     nod = -0.55 * (pelvis[:, 1] + spine[:, 1])
     return Posture(
-        fps=_PLAN,
-        hips=np.stack([way[:, 0], nothing, height - way[:, 1]], axis=-1),
-        heading=nothing,
-        pelvis=pelvis,
-        spine=spine,
-        head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1),
-        arms=arms,
+        fps=_PLAN, hips=np.stack([way[:, 0], nothing, height - way[:, 1]], axis=-1), heading=nothing, pelvis=pelvis,
+        spine=spine, head=np.stack([-0.5 * spine[:, 0], nod, look], axis=-1), arms=arms,
         wrists=np.stack([nothing + 0.1, forearm[:, 1]], axis=-1),
-        ankles=np.stack([foot[:, :3] for foot in feet], axis=1),
-        feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
+        ankles=np.stack([foot[:, :3] for foot in feet], axis=1), feet=np.stack([foot[:, 3:] for foot in feet], axis=1),
         toes=np.stack([np.clip(0.8 * foot[:, 4], 0.0, 0.7) * (foot[:, 2] < 0.3) for foot in feet], axis=-1),
         knees=np.zeros((len(times), 2)),
     )
 
 
-def _foot(rows: np.ndarray, neutral: Neutral, scale: float) -> np.ndarray:
-    """An ankle's way and the foot's turn (T, 6) out of rows (T, 5): ahead, left, raised, pitch, yaw in degrees."""
-    ahead, left, raised, pitch, yaw = rows.T
-    pitch, yaw = np.radians(pitch), np.radians(yaw)
-    up = neutral.ankle_height + raised * scale
-    up = up + lift_off_ground(up, pitch, neutral) * (np.abs(pitch) > 1e-3)
-    return np.stack([ahead * scale, left * scale, up, np.zeros_like(up), pitch, yaw], axis=-1)
+def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:
+    """(3,) m: the centre of a ball of that radius in the axes of the hand joint. InputError for a body without it."""
+    return grip_in(neutral_stance(skeleton), side, radius)
+
+
+def grip_in(neutral: Neutral, side: str, out: float | None = None) -> np.ndarray:
+    """As `grip_of`, of a skeleton whose neutral stance is known; out: m from the palm's middle, None: of an adult's
+    baseball, in the body's size."""
+    hand = getattr(identify(neutral.skeleton), side).hand
+    if hand is None:
+        raise InputError("throw", f"a body without a {side} hand", "a skeleton with arms and hands")
+    size, sign = neutral.leg / tables.LEG, 1.0 if side == "left" else -1.0
+    held = np.array([_AHEAD, -USUAL_GRIP * sign, -_DOWN]) * size
+    if out is not None:
+        held[1] = -sign * max(out, USUAL_GRIP * size)
+    return quaternion.rotate(quaternion.inverse(neutral.rotations[hand]), held)

@@ -1,10 +1,10 @@
 """A throw or kick made to hit: the smallest change of a motion with which the ball, as it leaves, flies to its target.
 
 A ball in the hand has the hand's velocity when it leaves; a ball that lies gets its own from the foot that meets it
-(`struck`). Both follow from the motion alone, between frames too (`motion.between_frames`), so a ball that is to fly
-elsewhere asks for another motion. What people change when they aim comes first and costs little: the body turns, the
-ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. What is left is a
-small smooth shift of the wrist or ankle about that instant (`shift`), which the arm or leg follows by inverse
+(`letting_go`). Both follow from the motion alone, between frames too (`motion.between_frames`), so a ball that is to
+fly elsewhere asks for another motion. What people change when they aim comes first and costs little: the body turns,
+the ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. What is left is a
+small smooth shift of the wrist or ankle about that instant (`led_limb`), which the arm or leg follows by inverse
 kinematics. Among all changes with which the ball hits, with drag, lift and gravity as in `ball.physics`, the one that
 costs least is found by Newton's method with Lagrange's multipliers; the release is looked for on a grid.
 """
@@ -21,9 +21,8 @@ from ..base.errors import InputError
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.motion import Motion, forward_kinematics, place
-from .led_limb import Hold, LedLimb, at_once
+from .led_limb import Hold, LedLimb, at_once, shifts_about
 from .letting_go import AtFoot, InHand, carried, grip_point
-from .shift import shifts_about
 
 FINE, LITTLE = 0.02, 0.05
 """m of miss and of moved wrist up to which the pace is left as it is."""
@@ -148,7 +147,7 @@ class _Search:
         tried = []
         for pace in (0.0, self.freedom.pace):
             self.bounds = np.array([self.freedom.turn, pace])
-            start = self._start(self.asked)
+            start = self.part.rest(self.given, self.asked, self.target, self.ball)
             for change, source in self._promising(start)[:_TRIED]:
                 tried.append(self._hit(change, source, start))
                 if tried[-1].missed < FINE and tried[-1].moved < LITTLE:
@@ -175,9 +174,6 @@ class _Search:
         rest = _Change(np.concatenate([np.zeros(6), change.row[6:]]))
         rows, _ = self._best(points, velocities, rest, start, *costs, fixed=self._rigid)
         return sum(float(pair @ costs[0] @ pair) for pair in rows[0, :6].reshape(2, 3).T)
-
-    def _start(self, frame: float) -> np.ndarray:
-        return self.part.rest(self.given, frame, self.target, self.ball)
 
     def _seconds(self, motion: Motion, frame: float, rest) -> float:
         """s until a ball that is not slowed is as far as the target."""

@@ -258,15 +258,9 @@ def library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> flo
     out once."""
     known = _usual.setdefault(library, {})
     if (fps, percent) not in known:
-        known[fps, percent] = _recorded_jerk(library, fps, percent)
+        recorded = [clip.recording for clip in library.clips if not clip.mirrored and not clip.made]
+        places = [forward_kinematics(resample(motion, fps))[0] for motion in recorded]
+        found = [uncut_windows(jerk(one, fps), np.zeros(len(one)))[0] for one in places]
+        values = np.concatenate(found) if found else np.zeros(0)
+        known[fps, percent] = float(np.percentile(values, percent)) if len(values) else np.nan
     return known[fps, percent]
-
-
-def _recorded_jerk(library: Library, fps: float, percent: float) -> float:
-    found = []
-    for clip in library.clips:
-        if not clip.mirrored and not clip.made:
-            places, _ = forward_kinematics(resample(clip.recording, fps))
-            found.append(uncut_windows(jerk(places, fps), np.zeros(len(places)))[0])
-    values = np.concatenate(found) if found else np.zeros(0)
-    return float(np.percentile(values, percent)) if len(values) else np.nan

@@ -88,9 +88,7 @@ def _plan(library: Library, part: _Stretch) -> Plan:
     fps = part.own.fps
     times = part.start + np.arange(part.low, part.high) / fps
     path = zero_phase_hann(part.own.root_positions[part.low : part.high, :2], fps, SMOOTH)
-    return Plan(
-        track=Track(times, path, None), library=library.folder, fps=fps, height=stature(part.own.skeleton),
-    )  # fmt: skip
+    return Plan(track=Track(times, path, None), library=library.folder, fps=fps, height=stature(part.own.skeleton))
 
 
 def _edges(part: _Stretch, new: Motion, old: Motion) -> tuple[int, int]:

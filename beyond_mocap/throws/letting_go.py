@@ -2,6 +2,12 @@
 
 Both are points that joints carry, between frames too (`motion.between_frames`): the ball in the hand, the ends of the
 foot's line. Where they are and how they move at one instant says how the ball leaves.
+
+A ball that lies leaves along the line from the foot's surface to its centre `RATIO` times as fast as the foot comes:
+(1 + e) M / (M + m) for a foot of effective mass M, some 1.2 in good kicks (Lees and Nolan 1998, J. Sports Sci. 16,
+211-234; Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165). Across it the foot takes the ball's surface along as
+far as friction goes, as the ground does at a bounce (`ball.physics`), which gives spin (Asai, Carre, Akatsuka and Haake
+2002, Sports Eng. 5, 183-192): a ball met below its middle rises and spins backward.
 """
 
 from __future__ import annotations
@@ -20,12 +26,15 @@ from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics, pose_kinematics
 from ..synthesis.construct.ball.carry import arm, leg
-from .struck import struck
 
 BEFORE, AFTER = 0.4, 0.4
 """Seconds before and after the release within which a wrist or ankle may be moved."""
 _ASHORE = 0.8  # m/s, a foot that is slower stands
 _STEP = 1e-3  # of frames, in differences
+RATIO = 1.2
+"""Speed of the ball over that of the foot, along the line between them."""
+FRICTION = 0.4
+"""Coulomb's, of shoe on ball: 0.3 to 0.5 (Asai et al. 2002)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +98,7 @@ class AtFoot:
 
     def leaves(self, points, velocities, rest, ball: Ball):
         """Position, velocity and spin (N, 3), and gap (N, 1) m."""
-        found = struck(points, velocities, FOOT_RADIUS, rest, ball)
+        found = strike_ball(points, velocities, FOOT_RADIUS, rest, ball)
         return rest, found.velocity, found.spin, found.gap[:, None]
 
     def span(self, motion: Motion, frame: float) -> tuple[int, int]:
@@ -138,3 +147,34 @@ def carried(part: InHand | AtFoot, motion: Motion, frames: np.ndarray) -> tuple[
     count = len(frames)
     found = grip_point(motion, part, np.concatenate([frames, frames - _STEP, frames + _STEP]))
     return found[:count], (found[2 * count :] - found[count : 2 * count]) * (0.5 * motion.fps / _STEP)
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """How balls (N) leave: velocity (N, 3) m/s and spin (N, 3) rad/s; gap (N,) m between foot and ball, negative where
+    they overlap; share (N,) of the way from the foot's first end to its other at which they touch."""
+
+    velocity: np.ndarray
+    spin: np.ndarray
+    gap: np.ndarray
+    share: np.ndarray
+
+
+def strike_ball(ends: np.ndarray, velocities: np.ndarray, radius: float, centre: np.ndarray, ball: Ball) -> Struck:
+    """Balls at `centre` (N, 3) m struck by a foot whose line has `ends` (N, 2, 3) m and moves with `velocities`
+    (N, 2, 3) m/s; radius: the foot's about that line, m."""
+    along = ends[:, 1] - ends[:, 0]
+    share = np.sum((centre - ends[:, 0]) * along, axis=-1) / np.maximum(np.sum(along * along, axis=-1), 1e-12)
+    share = np.clip(share, 0.0, 1.0)
+    way = centre - ends[:, 0] - share[:, None] * along
+    far = np.maximum(np.linalg.norm(way, axis=-1), 1e-9)
+    normal = way / far[:, None]
+    foot = velocities[:, 0] + share[:, None] * (velocities[:, 1] - velocities[:, 0])
+    into = np.sum(foot * normal, axis=-1)
+    push = RATIO * into[:, None] * normal
+    across = foot - into[:, None] * normal
+    wanted = across * ball.inertia / (1.0 + ball.inertia)
+    most = FRICTION * RATIO * np.maximum(into, 0.0) / np.maximum(np.linalg.norm(wanted, axis=-1), 1e-12)
+    drag = wanted * np.minimum(1.0, most)[:, None]
+    spin = np.cross(-normal, drag) / (ball.inertia * ball.radius)
+    return Struck(push + drag, spin, far - radius - ball.radius, share)

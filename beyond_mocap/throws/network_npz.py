@@ -7,6 +7,8 @@ import io
 import json
 import os
 from dataclasses import asdict, fields
+from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 
@@ -22,6 +24,8 @@ from .networks.example import Example
 from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
 
+WEIGHTS = Path(__file__).parent / "networks" / "weights"
+"""Where the weights that come with the project lie, one file an action."""
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
 LARGEST = 300_000_000
@@ -53,6 +57,15 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
         raise InputError(path, str(error)) from None
 
 
+@lru_cache(maxsize=4)
+def shipped_model(action: str) -> ThrowModel:
+    """The model of "throw" or "kick" that comes with the project. InputError where it is missing."""
+    path = WEIGHTS / f"{action}.npz"
+    if not path.is_file():
+        raise InputError(path, "no such weights", "weights of this action", "train some: beyond-mocap throw train")
+    return read_model(path)
+
+
 def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) -> None:
     """Write a model as `read_model` reads it, number for number; the same model gives the same bytes.
 
@@ -60,15 +73,14 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     that are shipped. InputError where it cannot be written, or where a weight is too large for float16.
     """
     arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
-    arrays |= _body_out(model) | _networks_out(model) | _examples_out(model)
+    arrays |= {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
+    arrays |= {name: one for name in ("joint_limits", "reference") if (one := getattr(model, name)) is not None}
+    arrays |= _networks_out(model) | _examples_out(model)
     if half:
         arrays = {name: one if name == HEADER else _halved(name, one) for name, one in arrays.items()}
     whole = io.BytesIO()
     np.savez_compressed(whole, **arrays)
     atomic_write(path, whole.getvalue())
-
-
-# -- writing
 
 
 def _header(model: ThrowModel) -> dict:
@@ -90,11 +102,6 @@ def _example_out(example: Example) -> dict:
         "launch": None if example.launch is None else [float(one) for one in example.launch],
         "stature": float(example.stature),
     }  # fmt: skip
-
-
-def _body_out(model: ThrowModel) -> dict:
-    out = {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
-    return out | {name: value for name in ("joint_limits", "reference") if (value := getattr(model, name)) is not None}
 
 
 def _networks_out(model: ThrowModel) -> dict:
@@ -124,9 +131,6 @@ def _halved(name: str, values: np.ndarray) -> np.ndarray:
     return values.astype(np.float16)
 
 
-# -- reading
-
-
 def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     """The model that arrays make; every array is used once, none is left over."""
     header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
@@ -135,7 +139,9 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     if header.get("version") != VERSION:
         raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
     check_names(header, HEADER, _ROWS, _ROWS)
-    settings = _settings(header["settings"])
+    names = [field.name for field in fields(ModelSettings)]
+    check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])
+    settings = ModelSettings(**header["settings"])
     skeleton = _skeleton(header["skeleton"], arrays)
     networks = {name: _network(name, settings.layers + 1, arrays) for name in settings.networks}
     rows = entries(header["examples"], "examples")
@@ -147,12 +153,6 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
     if arrays:
         raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
     return model
-
-
-def _settings(row) -> ModelSettings:
-    names = [field.name for field in fields(ModelSettings)]
-    check_names(row, "settings", names, [name for name in names if name not in ("guided", "carried")])
-    return ModelSettings(**row)
 
 
 def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:

@@ -1,8 +1,11 @@
-"""Folders of made throws and kicks whose targets are known: the truth that networks are trained and tested on.
+"""Synthetic throws and kicks whose targets are known: the truth that networks are trained and tested on, in folders.
 
 For each subject a folder of BVH files with their words (`NAME.txt`), and over all of them `throws.csv`, which says who
 threw with what, when the ball left, how fast, and through which point it flew. The ball flies through air, so the point
 is where it truly went.
+
+A kick is aimed as people aim: the whole approach turns to the target, a harder kick is swung faster, and the ball rises
+as the foot (of `synthetic.kicks`) meets it lower or with its toes less down (`letting_go.strike_ball`).
 """
 
 from __future__ import annotations
@@ -14,25 +17,39 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline, format_timeline
-from ..ball.physics import BASEBALL
+from ..annotation.striking import FOOT_RADIUS
+from ..ball.physics import BASEBALL, FOOTBALL, Ball
 from ..ball.wall import meets_wall
 from ..base.errors import Cancelled, InputError
+from ..base.time_series import interpolate
+from ..base.vectors import arctan2
 from ..files.bvh import bvh
 from ..files.whole import atomic_write, whole_folder
 from ..motion import quaternion
 from ..motion.motion import Motion, place
-from ..synthetic.kick_subjects import kick_style, kicker
-from ..synthetic.kicks import KICKS
-from ..synthetic.made_people import Person
-from ..synthetic.throw_subjects import subject, subject_throws
-from ..synthetic.throws import GRAVITY
-from .made_kicks import kick
-from .throw_examples import LAUNCH, TABLE_NAME, TARGET
+from ..motion.retargeting.adult import LEG, adult_skeleton
+from ..motion.retargeting.neutral import Neutral, neutral_stance
+from ..motion.skeleton import Skeleton
+from ..synthetic.gait_tables import GRAVITY
+from ..synthetic.gestures import choose_style
+from ..synthetic.kicks import BEFORE, KICKS, KickStyle, contact, kicked
+from ..synthetic.subjects import Person, make_kicker, make_throw, make_thrower, vary_kick
+from .letting_go import strike_ball
+from .throw_records import LAUNCH, TABLE_NAME, TARGET
 
 COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH, "ball_x_m", "ball_y_m", "ball_z_m")
 RATE = 120.0
 _TRIES = 50
 _INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside serves, and how often
+SLOWEST, FASTEST = 6.0, 36.0
+"""m/s of a ball."""
+_CLEAR = 0.05  # m that the toe joint is above the ground at the contact of an instep kick
+_AT_INSIDE = 0.35  # where along the foot, from ankle to toe joint, the inside meets the ball
+_STEEP = 0.5  # sine of the foot's slope above which it is an instep's
+_LOFTS = np.linspace(-16.0, 20.0, 5)  # degrees, tried for an instep kick
+_LIFTS = np.linspace(0.05, -0.03, 5)  # m, tried for one with the inside
+_ROUNDS = 6
+_HIT = 0.01  # m, near enough
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,7 +69,7 @@ class Planted:
 def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
     """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
     target, speed = _throw_order(thrower.fastest, chance)
-    made = subject_throws(thrower, target, speed, chance, fps)
+    made = make_throw(thrower, target, speed, chance, fps)
     impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
     words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
     return Planted(motion=made.motion, limb=limb, release=made.release, position=made.position, velocity=made.velocity,
@@ -66,7 +83,7 @@ def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) ->
         target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
         speed = float(chance.uniform(12.0, who.fastest))
         inside = speed < _INSIDE[0] and target[2] < _INSIDE[1] and chance.uniform() < _INSIDE[2]
-        style = kick_style(who, KICKS["inside" if inside else "instep"], speed, chance)
+        style = vary_kick(who, KICKS["inside" if inside else "instep"], speed, chance)
         try:
             made = kick(tuple(target), speed, who.side, style=style, skeleton=who.skeleton, fps=fps)
         except InputError:
@@ -142,5 +159,130 @@ def _written(folder: Path, who: str, name: str, example: Planted) -> str:
     return ",".join((f"{who}/{name}.bvh", who, example.limb, *(f"{number:.6f}" for number in numbers)))
 
 
-ACTIONS = {"throw": (planted_throw, subject), "kick": (planted_kick, kicker)}
+ACTIONS = {"throw": (planted_throw, make_thrower), "kick": (planted_kick, make_kicker)}
 """action -> who makes one of somebody's examples by chance, and who makes somebody by seed."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Kick:
+    """A made kick.
+
+    motion: the body. contact: s at which the foot meets the ball. foot: "left" or "right". ball: (3,) m, where the
+    ball's centre lies until then. velocity: (3,) m/s and spin: (3,) rad/s, as it leaves.
+    """
+
+    motion: Motion
+    contact: float
+    foot: str
+    ball: np.ndarray
+    velocity: np.ndarray
+    spin: np.ndarray
+
+
+def kick(
+    target: tuple[float, float, float] = (11.0, 0.0, 1.0), speed: float = 20.0, foot: str = "right",
+    style: str | KickStyle = "instep", skeleton: Skeleton | None = None, fps: float = 120.0, ball: Ball = FOOTBALL,
+) -> Kick:
+    """A kick out of three steps of a ball that lies at the origin, through `target` (3,) m.
+
+    speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
+    adult. style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown
+    foot or style.
+    """
+    how = choose_style("kick", foot, "foot", style=style, styles=KICKS, speed=speed, speeds=(SLOWEST, FASTEST))
+    neutral = neutral_stance(skeleton or adult_skeleton())
+    return _Aim(how, neutral, foot, ball).at(np.asarray(target, dtype=float), speed, fps)
+
+
+class _Aim:
+    """What one way of kicking can do with a ball: launches along +X by how the foot meets it."""
+
+    def __init__(self, style: KickStyle, neutral: Neutral, foot: str, ball: Ball):
+        self.style, self.neutral, self.foot, self.ball = style, neutral, foot, ball
+        steep = _slopes(contact(style, neutral, foot, [(0.0, 0.0)])[0])[0] > _STEEP
+        self.ways = self._cleared(_LOFTS) if steep else np.stack([_LIFTS, np.zeros_like(_LIFTS)], axis=-1)
+        launches = self.launches_of(self.ways)
+        rising = arctan2(launches[:, 5], np.hypot(launches[:, 3], launches[:, 4]))
+        order = np.argsort(rising)
+        self.rising, self.ways, self.launches = rising[order], self.ways[order], launches[order]
+
+    def _cleared(self, lofts: np.ndarray) -> np.ndarray:
+        """Ways (N, 2) (lift, loft) with the toes just over the ground."""
+        ends, _ = contact(self.style, self.neutral, self.foot, [(0.0, loft) for loft in lofts])
+        return np.stack([(_CLEAR - ends[:, 1, 2]) / (self.neutral.leg / LEG), lofts], axis=-1)
+
+    def launches_of(self, ways: np.ndarray) -> np.ndarray:
+        """The ball's place m, velocity m/s and spin rad/s (N, 9) at the table's pace, in ways (N, 2) of (lift,
+        loft)."""
+        ends, velocities = contact(self.style, self.neutral, self.foot, ways)
+        middle = velocities.mean(axis=1)
+        centre = np.stack([_touching(*each, self.ball.radius) for each in zip(ends, middle)])
+        found = strike_ball(ends, velocities, FOOT_RADIUS, centre, self.ball)
+        return np.concatenate([centre, found.velocity, found.spin], axis=-1)
+
+    def at(self, target: np.ndarray, speed: float, fps: float) -> Kick:
+        """The kick whose ball flies through the target, the ball at the origin."""
+        away = float(np.hypot(target[0], target[1]))
+        start = np.array([0.0, 0.0, self.ball.radius])
+        fallen = 0.5 * self.ball.gravity * (away / speed) ** 2
+        up, side = float(np.arctan2(target[2] - self.ball.radius + fallen, away)), 0.0
+        near = False
+        for number in range(_ROUNDS + 2):
+            way = interpolate(up, self.rising, self.ways)
+            exact = near or number >= _ROUNDS
+            launch = self.launches_of(way[None])[0] if exact else interpolate(up, self.rising, self.launches)
+            centre, velocity, spin = np.split(launch, 3)
+            rate = speed / float(np.linalg.norm(velocity))
+            turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
+            spun = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([rate * velocity, rate * spin]))
+            met, _ = meets_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
+            near = near or bool(np.linalg.norm(met - target) < _HIT)
+            if exact and np.linalg.norm(met - target) < _HIT:
+                break
+            up += float(np.arctan2(target[2] - met[2], away))
+            side += float((met[0] * target[1] - met[1] * target[0]) / away**2)
+        if np.linalg.norm(met - target) > 5.0 * _HIT:
+            raise InputError(
+                "kick", f"a ball of {speed:g} m/s passes the target by {np.linalg.norm(met - target):.2f} m",
+                "a target that it can reach", "kick faster, or aim lower or nearer",
+            )
+        motion = kicked(self.style, self.neutral, self.foot, lift=way[0], loft=way[1], rate=rate, turn=turn, fps=fps)
+        back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
+        return Kick(motion=place(motion, 0.0, back), contact=BEFORE / rate, foot=self.foot, ball=start,
+                    velocity=spun[0], spin=spun[1])
+
+
+def _slopes(ends: np.ndarray) -> np.ndarray:
+    """Sines (N,) of how steeply feet with ends (N, 2, 3) point down."""
+    return (ends[:, 0, 2] - ends[:, 1, 2]) / np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
+
+
+def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarray:
+    """The centre (3,) m of a ball on the ground that the foot's line (2, 3) m touches as it comes with `velocity` (3,).
+
+    A foot that points down meets it where its line is square to where it goes; a level one with its inside.
+    """
+    line = ends[1] - ends[0]
+    along, far = line / np.linalg.norm(line), FOOT_RADIUS + radius
+    normal = velocity - velocity @ along * along
+    normal /= np.linalg.norm(normal)
+    if abs(along[2]) > _STEEP:
+        share = (radius - far * normal[2] - ends[0, 2]) / line[2]
+        if 0.0 <= share <= 1.0:
+            return ends[0] + share * line + far * normal
+        point = ends[int(share > 1.0)]
+        normal = _rising_to(point, normal, np.zeros(3), radius, far)
+    else:
+        point = ends[0] + _AT_INSIDE * line
+        normal = _rising_to(point, normal, along, radius, far)
+    return point + far * normal
+
+
+def _rising_to(point: np.ndarray, normal: np.ndarray, along: np.ndarray, height: float, far: float) -> np.ndarray:
+    """The unit vector (3,) square to `along` (or free, where that is zero) by which `point` is `far` m from a centre at
+    `height` m, as near to `normal` as may be."""
+    up = np.array([0.0, 0.0, 1.0]) - along[2] * along
+    level = normal - normal @ up / (up @ up) * up
+    level /= np.linalg.norm(level)
+    rise = np.clip((height - point[2]) / far / np.sqrt(up @ up), -0.9, 0.9)
+    return np.sqrt(1.0 - rise**2) * level + rise * up / np.sqrt(up @ up)

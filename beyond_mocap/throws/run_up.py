@@ -43,7 +43,6 @@ OWN_WORD = "generated"
 
 ACTIONS = {action: labels.list_labels(action=action, is_root=True)[:1] for action in labels.ACTIONS}
 """What a network does -> the label of the key moment in which it does it."""
-"""The words of a generated clip beside that."""
 
 SMOOTH = 0.7
 """Seconds of the window that takes the sway out of a body's own path."""
@@ -110,7 +109,8 @@ def construct_run_up(
     more = add_throw_clip(search_library(library, resolved, report), own, release, action)
     with threadpool_limits(limits=1):
         order = _order(more, resolved)
-        edit = _search(more, order, plan.alpha, report, cancelled)
+        search = PathSearch(more, order, balanced(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
+        edit = search.run()
         report(0.8, "Laying out")
         construction = _construction(more, resolved, order, edit, _heading_of(own, at - release, between))
         planted, _ = construction.lay_out()
@@ -135,13 +135,6 @@ def _order(library: Library, plan: ResolvedPlan) -> Wanted:
     order = build_order(library, plan)
     keys = tuple(replace(key, rates=(1.0,)) if OWN_WORD in key.asked.words else key for key in order.keys)
     return replace(order, keys=keys)
-
-
-def _search(library: Library, order: Wanted, alpha: float, report: Progress, cancelled) -> EditList:
-    def tell(done, text):
-        report(0.8 * done, text)
-
-    return PathSearch(library, order, balanced(alpha), tell, cancelled).run()
 
 
 def _construction(

@@ -9,17 +9,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 
 from ..ball.arcs import arcs, out_of_reach
-from ..ball.flight import Flight, Launch, fly
+from ..ball.flight import Launch, fly
 from ..ball.impact import crossing
-from ..ball.physics import BALLS, FASTEST, THROWN, Ball
-from ..base.errors import InputError
+from ..ball.physics import FASTEST, Ball
+from ..base.errors import Cancelled, InputError
 from ..base.vectors import arctan2
 from ..motion import quaternion
 from ..motion.between_frames import cubic_at
@@ -28,27 +27,20 @@ from ..motion.mirror import mirror
 from ..motion.motion import Motion, place
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from ..motion.track.ball_path import BallPath
-from ..synthetic.grip import grip_of
 from ..synthetic.throws import FASTEST as FASTEST_HAND
-from .correction import FINE, LITTLE, Corrected, Freedom, corrected
-from .letting_go import AtFoot, InHand, grip_point, leaving
+from .correction import FINE, LITTLE, Corrected, corrected
+from .letting_go import AtFoot, InHand, leaving
 from .networks.chains import EFFECTORS
-from .networks.limb_limits import LimbLimits
+from .networks.limits import LimbLimits
 from .networks.model import ThrowModel
 from .networks.plan import Planned, Wish, planned, unlike
+from .throw_order import KINDS, Order, Thrown, ball_path, part_of
 
-KINDS: dict[str, Ball] = {**BALLS, **THROWN}
-"""Balls by name."""
-WEIGHTS = Path(__file__).parent / "networks" / "weights"
-"""Where the weights that come with the project lie, one file an action."""
 NEAREST = 1.5
 """Metres over the ground from body to target, at least."""
 _HIGHEST = 0.25  # of the stature, m above the ground that a ball lies at most which is kicked
 STATURES = (0.1, 10.0)
 """Metres of a body that throws."""
-RATES = (10.0, 480.0)
-"""Frames per second in which a throw can be shown: the ball's velocity is that of the hand between them."""
 _BEYOND_EXAMPLES = 1.2  # times the examples' fastest launch that a model can be asked for
 _MORE = 1.04  # times the slowest launch that reaches the target, at least
 _SUITS, _EASY = 1.6, 0.3  # times the slowest launch that suits, and by which logarithm another pace is an odd one
@@ -63,140 +55,6 @@ _ROUNDS = 6  # of finding where the body begins
 _GOES_ON = 1.0  # s that the ball is followed behind its target
 
 
-@dataclass(frozen=True)
-class Order:
-    """What is asked for.
-
-    target: (3,) m, world, that the ball's centre is to go through. limb: of EFFECTORS, None: what the examples use.
-    speed: m/s wished for as the ball leaves, None: what suits. ball: a kind's name or a `Ball`, None: baseball in a
-    hand, football at a foot. One of start, over, ball_place (each (2,) or (3,) m over the ground) says where: where
-    the hips are in the first frame; where they are at the release; where the ball is that is kicked, on the ground or
-    as far above it as a foot gets. None: start at the origin. The body faces as the examples do, against the target.
-    release_time: s on the caller's clock at which the ball leaves, None: the motion begins at 0. fps: of the result,
-    None: the model's. seed: another motion with the same aim. freedom: what the correction may change beside wrist or
-    ankle.
-    """
-
-    target: tuple[float, float, float]
-    limb: str | None = None
-    speed: float | None = None
-    ball: str | Ball | None = None
-    start: tuple[float, ...] | None = None
-    over: tuple[float, ...] | None = None
-    ball_place: tuple[float, ...] | None = None
-    release_time: float | None = None
-    fps: float | None = None
-    seed: int = 0
-    freedom: Freedom = field(default_factory=Freedom)
-
-    def __post_init__(self):
-        target = np.asarray(self.target, float)
-        if target.shape != (3,) or not np.all(np.isfinite(target)):
-            raise InputError("target", str(self.target)[:60], "x, y, z in metres")
-        if self.limb is not None and self.limb not in EFFECTORS:
-            raise InputError("limb", str(self.limb)[:40], ", ".join(EFFECTORS))
-        if isinstance(self.ball, str) and self.ball not in KINDS:
-            raise InputError("ball", self.ball[:40], ", ".join(KINDS))
-        if self.speed is not None and not 0.0 < self.speed < np.inf:
-            raise InputError("speed", f"{self.speed:g} m/s", "more than 0")
-        if self.seed < 0:
-            raise InputError("seed", str(self.seed)[:40], "0 or more")
-        given = [value for value in (self.start, self.over, self.ball_place) if value is not None]
-        if len(given) > 1:
-            raise InputError("throw", "several places", "one of start, over and ball_place")
-        if any(len(value) not in (2, 3) or not np.all(np.isfinite(value)) for value in given):
-            raise InputError("throw", f"a place {given[0]}"[:60], "x, y or x, y, z in metres")
-        if self.ball_place is not None and self.limb is not None and self.limb.endswith("hand"):
-            raise InputError("throw", "a place where the ball lies", "a foot that kicks it")
-        if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
-            raise InputError("fps", f"{self.fps:g}", f"{RATES[0]:g} to {RATES[1]:g} frames a second")
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Thrown:
-    """A throw or kick that hits as well as physics lets it.
-
-    motion; start_time: s of its first frame on the caller's clock; release: s from its first frame at which the ball
-    leaves. limb: of EFFECTORS. ball: its kind. grip: (3,) m, the ball in the hand joint's axes, None for kicks. path:
-    the ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its
-    target. launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T,
-    3) m. turned rad, pace, later s, elsewhere m: how else the motion was changed (see `Corrected`). slowest: m/s
-    below which no ball gets there. asked_speed: m/s wished for, without a wish what came. raw_deviation: m that hands
-    and feet were off their wanted ways before any inverse kinematics, on average.
-    beyond: rad that a joint of the corrected limb is beyond the model's limits at most, which is nothing but what other
-    bones or another rate have made of it before anything was corrected. examples: names and weights of what it was
-    planned from. warnings: lines for people.
-    """
-
-    motion: Motion
-    start_time: float
-    release: float
-    limb: str
-    ball: Ball
-    grip: np.ndarray | None
-    path: BallPath
-    launch: Launch
-    flight: Flight
-    target: np.ndarray
-    impact: np.ndarray
-    moved: float
-    shift: np.ndarray
-    turned: float
-    pace: float
-    later: float
-    elsewhere: float
-    slowest: float
-    asked_speed: float
-    raw_deviation: float
-    beyond: float
-    examples: tuple[tuple[str, float], ...]
-    warnings: tuple[str, ...] = ()
-
-    @property
-    def impact_error(self) -> float:
-        """m between target and impact, infinite where the ball does not get there."""
-        error = float(np.linalg.norm(self.impact - self.target))
-        return error if np.isfinite(error) else np.inf
-
-    @property
-    def speed(self) -> float:
-        """m/s of the ball as it leaves."""
-        return float(np.linalg.norm(self.launch.velocity))
-
-    @property
-    def release_time(self) -> float:
-        """s on the caller's clock at which the ball leaves."""
-        return self.start_time + self.release
-
-    def report(self) -> dict:
-        """All figures, for a JSON report."""
-        frames = np.flatnonzero(np.any(self.shift != 0.0, axis=1))
-        return {
-            "limb": self.limb, "ball": self.ball.name, "fps": self.motion.fps, "frames": len(self.motion),
-            "duration_s": self.motion.duration, "release_time_s": self.release_time,
-            "release_frame": self.release * self.motion.fps, "release_position_m": self.launch.position,
-            "velocity_m_s": self.launch.velocity, "spin_rad_s": self.launch.spin, "speed_m_s": self.speed,
-            "asked_speed_m_s": self.asked_speed, "slowest_m_s": self.slowest, "target_m": self.target,
-            "impact_m": self.impact, "impact_error_m": self.impact_error, "moved_m": self.moved,
-            "corrected_frames": [int(frames[0]), int(frames[-1])] if len(frames) else [],
-            "turned_deg": np.degrees(self.turned), "pace": self.pace, "release_later_s": self.later,
-            "begins_elsewhere_m": self.elsewhere,
-            "raw_deviation_m": self.raw_deviation, "joint_beyond_deg": np.degrees(self.beyond),
-            "examples": {name: weight for name, weight in self.examples}, "warnings": list(self.warnings),
-        }  # fmt: skip
-
-
-@lru_cache(maxsize=4)
-def shipped_model(action: str) -> ThrowModel:
-    """The model of "throw" or "kick" that comes with the project. InputError where it is missing."""
-    from .network_npz import read_model
-
-    path = WEIGHTS / f"{action}.npz"
-    if not path.is_file():
-        raise InputError(path, "no such weights", "weights of this action", "train some: beyond-mocap throw train")
-    return read_model(path)
-
-
 def throw_at(
     model: ThrowModel, order: Order, skeleton: Skeleton | None = None,
     progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
@@ -206,8 +64,6 @@ def throw_at(
     InputError: a limb that the skeleton lacks or the model was not trained for, a target that no human or none of the
     model's examples reaches.
     """
-    from ..base.errors import Cancelled
-
     def told(share: float, text: str) -> None:
         if cancelled and cancelled():
             raise Cancelled("cancelled")
@@ -245,12 +101,6 @@ def _cost(found: Corrected) -> float:
     return found.missed + 0.2 * found.moved
 
 
-def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None = None) -> InHand | AtFoot:
-    """What lets the ball go. lies (3,) m: where a ball lies that is kicked, None: where it suits."""
-    side, what = EFFECTORS[limb].split("_")
-    return AtFoot(side, lies) if what == "foot" else InHand(side, grip_of(skeleton, side, ball.radius))
-
-
 @lru_cache(maxsize=8)
 def launches_of(model: ThrowModel, limb: int, ball: Ball) -> tuple[np.ndarray, ...]:
     """Where (E, 3) m, how fast (E, 3) m/s and with which spin (E, 3) rad/s such a ball leaves each example of the
@@ -273,6 +123,7 @@ class _Work:
         self.limb = EFFECTORS.index(order.limb) if order.limb else _usual_limb(model)
         self._check()
         used = {example.limb for example in model.examples}
+        self._human = f"which is what a human gives a {'kick' if self.kicks else 'throw'}"
         self.mirrored = self.limb not in used and self.limb ^ 1 in used
         self.own_limb = self.limb ^ 1 if self.mirrored else self.limb
         kind = order.ball or ("football" if self.kicks else "baseball")
@@ -331,7 +182,8 @@ class _Work:
         own = [n for n, example in enumerate(examples) if example.limb == self.own_limb]
         if not own:
             raise InputError("model", f"no example with the {EFFECTORS[self.limb].replace('_', ' ')}", "some with it")
-        ahead = self._from_anchor(np.median([self._anchor(examples[n], places[n]) for n in own], axis=0))
+        begin, _ = self._laid(np.median([self._anchor(examples[n], places[n]) for n in own], axis=0))
+        ahead = float(np.linalg.norm(self.target[:2] - begin))
         if ahead < NEAREST:
             found = f"{ahead:.2f} m from the body"
             raise InputError("target", found, f"{NEAREST:g} m or more", "move one of them away")
@@ -340,7 +192,8 @@ class _Work:
         spin, fastest = np.median(spins[own], axis=0), float(np.linalg.norm(self.launches[own], axis=1).max())
         self._check_far(start, end, spin, fastest)
         self.arcs = arcs(start, end, self.ball, spin)
-        self._check_human(self.arcs.slowest)
+        if self.arcs.slowest > self.fastest:
+            raise self._too_far(f"{self.arcs.slowest:.0f} m/s or more", self.fastest, self._human)
         self._check_reach(fastest)
         self._check_steep(own, min(self.fastest, _BEYOND_EXAMPLES * fastest))
         wishes, seed = self._by_pace(own, ahead), self.order.seed
@@ -360,12 +213,6 @@ class _Work:
         given = next((value for value in (order.start, order.over, order.ball_place) if value is not None), (0.0, 0.0))
         return np.asarray(given, float)[:2]
 
-    def _from_anchor(self, anchor: np.ndarray) -> float:
-        """m over the ground from where the hips begin to the target, if `anchor` (2,) of the normalised frame lies
-        where the order has it."""
-        begin, _ = self._laid(anchor)
-        return float(np.linalg.norm(self.target[:2] - begin))
-
     def _laid(self, anchor: np.ndarray) -> tuple[np.ndarray, float]:
         """Where (2,) m the normalised frame's origin lies, and its turn, rad: `anchor` (2,) m of it is where the order
         says, and its X axis leads to the target."""
@@ -379,14 +226,17 @@ class _Work:
 
     def _check_far(self, start: np.ndarray, end: np.ndarray, spin: np.ndarray, own: float) -> None:
         """InputError for a target that is plainly too far, before anything slow is done."""
-        human = f"which is what a human gives a {'kick' if self.kicks else 'throw'}"
         model = f"the model's fastest example has {own:.0f}"
-        for most, what in ((self.fastest, human), (_BEYOND_EXAMPLES * own, model)):
+        for most, what in ((self.fastest, self._human), (_BEYOND_EXAMPLES * own, model)):
             slowest = _slowest_without_air(start, end, self.ball.gravity)
             if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
-                far = float(np.linalg.norm(self.target[:2] - self._where()))
-                raise InputError("target", f"{far:.0f} m away: that takes more than {most:.0f} m/s",
-                                 f"at most {most:.0f} m/s, {what}", "choose a nearer or lower target")  # fmt: skip
+                raise self._too_far(f"more than {most:.0f} m/s", most, what)
+
+    def _too_far(self, takes: str, most: float, what: str) -> InputError:
+        """A target that takes such a speed, where no more than `most` m/s are there; what: says why."""
+        far = float(np.linalg.norm(self.target[:2] - self._where()))
+        return InputError("target", f"{far:.0f} m away: that takes {takes}", f"at most {most:.0f} m/s, {what}",
+                          "choose a nearer or lower target")  # fmt: skip
 
     def _check_steep(self, own: list[int], most: float) -> None:
         """InputError for a target to which the ball has to leave far more steeply than in any of the examples."""
@@ -395,20 +245,9 @@ class _Work:
         steepest = float(arctan2(known[:, 2], np.hypot(known[:, 0], known[:, 1])).max())
         if steep > steepest + _STEEPER:
             found = f"the ball has to leave at {np.degrees(steep):.0f} degrees"
-            expected = (
-                f"at most {np.degrees(steepest + _STEEPER):.0f}: the steepest example has {np.degrees(steepest):.0f}"
-            )
+            most = np.degrees(steepest + _STEEPER)
+            expected = f"at most {most:.0f}: the steepest example has {np.degrees(steepest):.0f}"
             raise InputError("target", found, expected, "move it further off or lower")
-
-    def _check_human(self, slowest: float) -> None:
-        """InputError for a target that takes a faster ball than a human gives."""
-        far, most = np.linalg.norm(self.target[:2] - self._where()), self.fastest
-        if slowest > most:
-            raise InputError(
-                "target", f"{far:.0f} m away: that takes {slowest:.0f} m/s or more",
-                f"at most {most:.0f} m/s, which is what a human gives a {'kick' if self.kicks else 'throw'}",
-                "choose a nearer or lower target",
-            )
 
     def _check_reach(self, own: float) -> None:
         """InputError for a speed that does not reach the target, or that is too far beyond the examples' `own`."""
@@ -547,39 +386,6 @@ class _Work:
             )
         if self.order.speed and abs(speed - self.order.speed) > 0.1 * self.order.speed:
             self.warnings.append(f"the ball leaves at {speed:.1f} m/s, {self.order.speed:.1f} were asked for")
-
-
-def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
-    """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on,
-    which the ball leaves at `release` s: as `throws.join_throw` says. The ball is held, or lies, all the time
-    before."""
-    launch = replace(thrown.launch, time=release)
-    flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
-    shift = np.zeros((len(motion), 3))
-    shift[first : first + len(thrown.shift)] = thrown.shift[: len(motion) - first]
-    part = part_of(motion.skeleton, EFFECTORS.index(thrown.limb), thrown.ball)
-    seconds = thrown.path.times[-1] - thrown.launch.time
-    return replace(
-        thrown, motion=motion, start_time=start, release=release - start, shift=shift, launch=launch, flight=flight,
-        path=ball_path(motion, part, flight, start, seconds),
-    )
-
-
-def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
-    """The ball at the motion's rate, from `start` s on the caller's clock until the motion ends and it has flown
-    `seconds`."""
-    fps = motion.fps
-    left = flight.launch.time
-    last = max(len(motion) - 1, int(np.ceil((left - start + seconds) * fps)))
-    frames = np.arange(last + 1)
-    times = start + frames / fps
-    flies = times > left
-    positions = flight.at(np.maximum(times, left))
-    if isinstance(part, InHand):
-        held = frames[~flies]
-        positions[held] = grip_point(motion, part, held.astype(float))[:, 0]
-    rotations = quaternion.identity(len(times)) if not np.any(flight.launch.spin) else flight.rotations(times)
-    return BallPath(times, positions, np.zeros(len(times), bool), rotations)
 
 
 def _slowest_without_air(start: np.ndarray, end: np.ndarray, gravity: float) -> float:

@@ -7,21 +7,16 @@ down is read off the motion: which hand or foot, how fast the ball left, and whe
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from ..annotation import ClipAnnotation
-from ..annotation.labels import list_labels
-from ..ball.physics import BASEBALL, FOOTBALL, Ball
+from ..ball.physics import BASEBALL, FOOTBALL
 from ..ball.wall import meets_wall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
-from ..files.content import content
-from ..files.tables import number, read_rows
 from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
 from ..library.scan import Annotations, find_clips
 from ..motion import quaternion
@@ -30,16 +25,12 @@ from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
-from ..synthetic.grip import grip_of
-from .networks.chains import EFFECTORS as LIMBS
+from ..synthetic.throws import grip_of
 from .networks.chains import chains_of
 from .networks.example import Example, example_of, mirrored
+from .throw_records import ACTIONS, TABLE_NAME, Action, KnownThrow, is_known, read_known, read_table
 
-TABLE_NAME = "throws.csv"
 _PAGE = "docs/throws/throw-examples.md"
-TARGET = ("target_x_m", "target_y_m", "target_z_m")
-LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
-_SAME_MOMENT = 0.5  # s between key moments that are of one throw
 _AT_REST = 3.0  # m/s, slower balls have not been thrown
 _OF_FOOT = 1.2  # a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
 _SHIFTED_FLOOR = 0.03  # m, heights of the lowest point up to which the floor is taken to be at 0
@@ -47,56 +38,14 @@ _LOOK = 0.001  # s before and after the release between which the ball's speed i
 _AROUND = 0.8  # s beyond an example's ends that are read too, for what networks see there
 _ON_GROUND = 0.4  # m, a toe below this kicks a ball that lies
 _LATE = 0.03  # s by which a foot's key moment may lead or follow the contact
-_FASTEST = 100.0  # m/s, no ball leaves a hand or a foot faster
 _TARGET_AWAY = (0.5, 200.0)  # m from the ball as it leaves to where it flew through
 _UNDER_FLOOR = 0.5  # m that a target may lie under what is taken for the floor
 
 
-@dataclass(frozen=True, kw_only=True)
-class Action:
-    """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are
-    wanted at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
-
-    words: frozenset[str]
-    limbs: tuple[int, int]
-    before: tuple[float, float]
-    after: tuple[float, float]
-    wall: float
-    ball: Ball
-
-
-ACTIONS = {
-    "throw": Action(words=frozenset(list_labels(action="throw")), limbs=(0, 1), before=(1.6, 3.0), after=(1.2, 2.0),
-                    wall=4.0, ball=BASEBALL),
-    "kick": Action(words=frozenset(list_labels(action="kick")), limbs=(2, 3), before=(1.2, 3.0), after=(0.8, 2.0),
-                   wall=11.0, ball=FOOTBALL),
-}
-"""The walls: Fredriksson's stood about 4 m away (§8.2); a penalty is shot from 11 m."""
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class _Known:
-    """What was written about one throw; None is unknown. stretch, release: s. target, launch: (3,). speed m/s."""
-
-    stretch: tuple[float, float] | None = None
-    release: float | None = None
-    limb: int | None = None
-    target: np.ndarray | None = None
-    launch: np.ndarray | None = None
-    speed: float | None = None
-    subject: str | None = None
-
-
 def examples_in(
-    folder: str | Path,
-    action: str = "throw",
-    fps: float = 30.0,
-    skeleton: Skeleton | None = None,
-    told: Callable[[str], None] = lambda line: None,
-    *,
-    mirror: bool = False,
-    progress: Callable[[float, str], None] = lambda share, text: None,
-    cancelled: Callable[[], bool] = lambda: False,
+    folder: str | Path, action: str = "throw", fps: float = 30.0, skeleton: Skeleton | None = None,
+    told: Callable[[str], None] = lambda line: None, *, mirror: bool = False,
+    progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> list[Example]:
     """The examples of `action` ("throw" or "kick") below `folder`, at `fps` frames per second, each in its own frame.
 
@@ -112,7 +61,7 @@ def examples_in(
     folder = Path(folder)
     clips = find_clips(folder)
     names = [path.relative_to(folder).as_posix() for path in clips]
-    words, table = Annotations(folder, clips), _table(folder, ACTIONS[action], set(names))
+    words, table = Annotations(folder, clips), read_table(folder, ACTIONS[action], set(names))
     _tell_strangers(words, ACTIONS[action], folder, told)
     bring = _Bring(skeleton)
     found: list[Example] = []
@@ -121,7 +70,7 @@ def examples_in(
         if cancelled():
             raise Cancelled("cancelled")
         progress(order / len(clips), path.name)
-        if not _told_of(path, ACTIONS[action], words, table.get(name)):
+        if not is_known(path, ACTIONS[action], words, table.get(name)):
             without.append(name)
             continue
         try:
@@ -137,12 +86,10 @@ def examples_in(
     if not found:
         raise InputError(folder, f"each {action} in it had to be left out", "some that can be read",
                          f"see the notes, and {_PAGE}")  # fmt: skip
-    return [each for example in found for each in ((example, _renamed(example)) if mirror else (example,))]
-
-
-def _told_of(path: Path, action: Action, words: Annotations, rows: list[_Known] | None) -> bool:
-    """Whether anybody wrote down that a recording has such an action."""
-    return bool(rows) or any(_annotated(words, path, 120.0, action)) or _report_of(path).is_file()
+    if not mirror:
+        return found
+    twins = (replace(mirrored(example), name=f"{example.name} (mirrored)") for example in found)
+    return [each for pair in zip(found, twins) for each in pair]
 
 
 def _tell_strangers(words: Annotations, action: Action, folder: Path, told: Callable[[str], None]) -> None:
@@ -162,8 +109,8 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
     """A folder without the action; who looked for the wrong one is told."""
     names = {path.relative_to(folder).as_posix() for path in clips}
     for other, its in ACTIONS.items():
-        rows = _table(folder, its, names) if other != action else {}
-        count = sum(_told_of(path, its, words, rows.get(path.relative_to(folder).as_posix())) for path in clips)
+        rows = read_table(folder, its, names) if other != action else {}
+        count = sum(is_known(path, its, words, rows.get(path.relative_to(folder).as_posix())) for path in clips)
         if other != action and count:
             found = f"{len(clips)} BVH files, none with a {action}, {count} with a {other}"
             return InputError(
@@ -176,129 +123,20 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
     )
 
 
-def _renamed(example: Example) -> Example:
-    return replace(mirrored(example), name=f"{example.name} (mirrored)")
-
-
 def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: float, bring, told) -> list[Example]:
     """All examples in one recording."""
     motion = bvh.read(path).motion
-    every = _known(path, motion, action, words, rows)
+    every = read_known(path, motion.fps, action, words, rows)
+    above = Path(name).parent.as_posix()
+    usual = above if above != "." else motion.skeleton.fingerprint
     out = []
     for order, known in enumerate(every):
         own = name if len(every) == 1 else f"{name} {order + 1}"
         try:
-            out.append(_example(own, motion, known, action=action, fps=fps, bring=bring,
-                                who=_subject(name, known, motion)))
+            out.append(_example(own, motion, known, action=action, fps=fps, bring=bring, who=known.subject or usual))
         except BeyondMocapError as error:
             told(f"{own}: left out, {error}")
     return out
-
-
-def _subject(name: str, known: _Known, motion: Motion) -> str:
-    above = Path(name).parent.as_posix()
-    return known.subject or (above if above != "." else motion.skeleton.fingerprint)
-
-
-def _known(path: Path, motion: Motion, action: Action, words: Annotations, rows: list[_Known] | None) -> list[_Known]:
-    """What is known of each throw in a recording: the table first, then the report beside it, then its annotations."""
-    annotated = list(_annotated(words, path, motion.fps, action))
-    measured = _measured(_report_of(path), action)
-    if not rows:
-        return [_filled(measured, _near(annotated, measured.release))] if measured else annotated
-    return [_filled(_filled(row, measured), _near(annotated, row.release)) for row in rows]
-
-
-def _near(annotated: list[_Known], release: float | None) -> _Known | None:
-    """The annotation of a release, the first where its time is not known."""
-    if release is None:
-        return annotated[0] if annotated else None
-    close = [known for known in annotated if abs(known.release - release) < _SAME_MOMENT]
-    return min(close, key=lambda known: abs(known.release - release), default=None)
-
-
-def _filled(known: _Known, other: _Known | None) -> _Known:
-    """`known`, with what only `other` knows."""
-    if other is None:
-        return known
-    unknown = {name: getattr(other, name) for name, value in vars(known).items() if value is None}
-    return replace(known, **unknown)
-
-
-def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> Iterator[_Known]:
-    """The throws that annotations tell, each key moment once, in their order in time."""
-    last = -np.inf
-    rows: list[ClipAnnotation] = [row for row in words.of(path, fps) if action.words & set(row.words)]
-    for row in sorted((row for row in rows if row.key is not None), key=lambda row: row.key):
-        release = row.key / fps
-        if release - last < _SAME_MOMENT:
-            continue
-        last = release
-        sides = [side for side, word in enumerate(("left", "right")) if word in row.words]
-        yield _Known(stretch=(row.start / fps, row.end / fps), release=release,
-                     limb=action.limbs[sides[0]] if len(sides) == 1 else None)
-
-
-def _table(folder: Path, action: Action, names: set[str]) -> dict[str, list[_Known]]:
-    """Rows of `throws.csv` in `folder` by file, one of the recordings' `names`; those of other limbs than the action's
-    left out. Nothing where there is none."""
-    path, out = folder / TABLE_NAME, {}
-    if not path.is_file():
-        return out
-    for where, row in read_rows(path, ("file",)):
-        known = _row(row, where)
-        file = Path(row["file"]).as_posix()
-        if file not in names:
-            raise InputError(where, f"no file {row['file'][:80]!r}", "a BVH file below this table, as seen from it")
-        if known.limb is None or known.limb in action.limbs:
-            out.setdefault(file, []).append(known)
-    return out
-
-
-def _row(row: dict[str, str], where: str) -> _Known:
-    def value(name: str) -> float | None:
-        return number(row[name], name, where) if (row.get(name) or "").strip() else None
-
-    def vector(names: tuple[str, ...]) -> np.ndarray | None:
-        values = [value(name) for name in names]
-        if any(v is None for v in values) and any(v is not None for v in values):
-            raise InputError(where, f"only some of {', '.join(names)}", "all three or none")
-        return None if values[0] is None else np.array(values)
-
-    limb = (row.get("limb") or "").strip().lower()
-    if limb and limb not in LIMBS:
-        raise InputError(where, f"limb {limb!r}"[:80], f"one of {', '.join(LIMBS)}")
-    launch, speed = vector(LAUNCH), value("speed_m_s")
-    for name, fast in (("speed_m_s", speed), ("launch", None if launch is None else float(np.linalg.norm(launch)))):
-        if fast is not None and not 0.0 < fast <= _FASTEST:
-            expected = f"more than 0, at most {_FASTEST:g} m/s"
-            raise InputError(where, f"{name} {fast:g} m/s", expected, "correct the cell or leave it empty")
-    return _Known(stretch=None, release=value("release_s"), limb=LIMBS.index(limb) if limb else None,
-                  target=vector(TARGET), launch=launch, speed=speed, subject=(row.get("subject") or "").strip() or None)
-
-
-def _report_of(path: Path) -> Path:
-    return path.with_suffix(".release.json")
-
-
-def _measured(path: Path, action: Action) -> _Known | None:
-    """What the report of `release` says about a throw; None where there is none."""
-    if not path.is_file() or action.ball is not BASEBALL:
-        return None
-    try:
-        report = json.loads(content(path, "a report of 'release'").decode("utf-8"))
-        speed = float(report["speed_m_s"])
-        launch = speed * np.asarray(report["direction"], float)
-        limb = LIMBS.index(f"{report['hand']}_hand")
-        release = float(report["release_time_s"])
-        impact = report.get("impact_m")
-        impact = np.array(impact, float) if isinstance(impact, list) and len(impact) == 3 else None
-        known = [*launch, release] if impact is None else [*launch, release, *impact]
-        if not (launch.shape == (3,) and np.isfinite(known).all() and np.linalg.norm(launch) <= _FASTEST):
-            raise ValueError
-    except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
-        raise InputError(path, "no report of a release", "what the command 'release' writes") from None
-    return _Known(stretch=None, release=release, limb=limb, target=impact, launch=launch, speed=speed)
 
 
 class _Bring:
@@ -317,7 +155,9 @@ class _Bring:
         return self._rigs[key].carry(motion)
 
 
-def _example(name: str, motion: Motion, known: _Known, action: Action, fps: float, bring: _Bring, who: str) -> Example:
+def _example(
+    name: str, motion: Motion, known: KnownThrow, action: Action, fps: float, bring: _Bring, who: str
+) -> Example:
     """One example cut out, brought to the wanted skeleton and rate, and set into its own frame."""
     if known.release is None:
         raise InputError("release", "no time", f"release_s in {TABLE_NAME}, or a key moment")
@@ -357,7 +197,7 @@ def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np
     return target
 
 
-def _stretch(motion: Motion, known: _Known, action: Action) -> tuple[float, float]:
+def _stretch(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, float]:
     """Seconds between which the example lies."""
     begin, end = known.stretch or (known.release, known.release)
     begin = np.clip(begin, known.release - action.before[1], known.release - action.before[0])
@@ -365,7 +205,7 @@ def _stretch(motion: Motion, known: _Known, action: Action) -> tuple[float, floa
     return max(float(begin), 0.0), min(float(end), motion.duration)
 
 
-def _cut(motion: Motion, known: _Known, action: Action) -> tuple[float, Motion]:
+def _cut(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, Motion]:
     """The second from which on, and the frames which tell the example and what its windows see beyond it."""
     begin, end = _stretch(motion, known, action)
     first = max(int(np.floor((begin - _AROUND) * motion.fps)), 0)
@@ -375,7 +215,7 @@ def _cut(motion: Motion, known: _Known, action: Action) -> tuple[float, Motion]:
     return first / motion.fps, cut
 
 
-def _on_floor(motion: Motion, known: _Known) -> tuple[Motion, _Known]:
+def _on_floor(motion: Motion, known: KnownThrow) -> tuple[Motion, KnownThrow]:
     """The same with the floor at 0, where the recording has it elsewhere."""
     places, _ = forward_kinematics(motion)
     lowest = np.concatenate([places, end_positions(motion)], axis=1)[..., 2].min(axis=1)
@@ -422,14 +262,14 @@ def _fastest(motion: Motion, release: float, action: Action) -> int:
     return action.limbs[int(np.argmax(speeds))]
 
 
-def _contact(motion: Motion, known: _Known, action: Action) -> float:
+def _contact(motion: Motion, known: KnownThrow, action: Action) -> float:
     """The second near the key moment at which the foot is fastest: derived key moments lead or follow the contact."""
     limb = _fastest(motion, known.release, action) if known.limb is None else known.limb
     seconds = known.release + np.linspace(-_LATE, _LATE, 13)
     return float(seconds[int(np.argmax([np.linalg.norm(_velocity(motion, at, limb)) for at in seconds]))])
 
 
-def _launched(motion: Motion, release: float, limb: int, known: _Known) -> tuple[np.ndarray, np.ndarray]:
+def _launched(motion: Motion, release: float, limb: int, known: KnownThrow) -> tuple[np.ndarray, np.ndarray]:
     """The ball's place (3,) m and velocity (3,) m/s as it leaves."""
     position = _ball(motion, release, limb)
     if known.launch is not None:

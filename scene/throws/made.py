@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.throws.join_throw import JoinedThrow
-    from ...beyond_mocap.throws.throw import Thrown
+    from ...beyond_mocap.throws.throw_order import Thrown
 
 FOLLOWED, LONGEST = 3.0, 10.0
 """Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""
@@ -146,17 +146,16 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
 
 def _model(order: Order):
     """The trained model that is asked for."""
-    from ...beyond_mocap.throws.network_npz import read_model
-    from ...beyond_mocap.throws.throw import shipped_model
+    from ...beyond_mocap.throws.network_npz import read_model, shipped_model
 
     return read_model(order.model) if order.model else shipped_model(order.act)
 
 
 def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
     """The throw that begins, or is at its release, or finds the ball, `where`."""
-    from ...beyond_mocap.throws import throw
+    from ...beyond_mocap.throws import throw, throw_order
 
-    asked = throw.Order(
+    asked = throw_order.Order(
         target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind,
         fps=order.fps, seed=order.seed, **where,
     )

@@ -1,15 +1,27 @@
 """Models whose networks are linear least squares, for tests that need sensible answers within a second."""
 
+from collections.abc import Iterable
+from typing import NamedTuple
+
 import numpy as np
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.made_kicks import kick
-from beyond_mocap.throws.networks.example import example_of
+from beyond_mocap.throws.networks.answers import network_output
+from beyond_mocap.throws.networks.example import Example, example_of
+from beyond_mocap.throws.networks.features import network_input, phase_of
 from beyond_mocap.throws.networks.limits import learn
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
-from beyond_mocap.throws.networks.training_set import leg_reach, training_set
+from beyond_mocap.throws.networks.training_set import (
+    joined,
+    leg_reach,
+    reference_of,
+    shared_chains,
+    steps,
+    with_mirrors,
+)
+from beyond_mocap.throws.planted_examples import kick
 
 FAR = 1e3  # hidden values are moved by it, so that no unit is ever below 0, where it would bend
 
@@ -27,6 +39,33 @@ def planted_examples(count=12, seed=0, fps=30.0):
         found.append(example_of(f"throw{len(found)}", "one", made.motion, "right_hand", made.release,
                                 (far, 0.0, high), made.velocity, fps, span))  # fmt: skip
     return tuple(found)
+
+
+class TrainingSet(NamedTuple):
+    """inputs (N, in), answers (N, out) and phases (N,) of one network; N steps of all examples one after the other."""
+
+    inputs: np.ndarray
+    answers: np.ndarray
+    phases: np.ndarray
+
+
+def training_set(examples: Iterable[Example], settings: ModelSettings, mirrors: bool = False) -> dict[str, TrainingSet]:
+    """What each network of `settings.networks` learns from. mirrors: with the mirror image of each example too.
+
+    All examples have the same skeleton. InputError where there is none or they differ.
+    """
+    examples = with_mirrors(examples) if mirrors else list(examples)
+    chains = shared_chains(examples)
+    reference = reference_of(examples) if settings.phase == "warped" else None
+    reach, whole = leg_reach(examples), joined([steps(example, reference) for example in examples])
+    return {
+        name: TrainingSet(
+            network_input(name, chains, settings, *whole),
+            network_output(name, chains, settings, whole.pose, whole.after),
+            phase_of(name, chains, whole.after, whole.window, reach),
+        )
+        for name in settings.networks
+    }
 
 
 def linear_model(examples, action="throw", ridge=1.0):

@@ -9,16 +9,14 @@ from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import example_of, poses
+from beyond_mocap.throws.networks.frame_step import OneFrame
 from beyond_mocap.throws.networks.limits import JointLimits, learn
 from beyond_mocap.throws.networks.model import ThrowModel
-from beyond_mocap.throws.networks.one_frame import OneFrame
 from beyond_mocap.throws.networks.training_set import leg_reach, steps
-from training.arrays import ARRAYS
 from training.config import config_of
-from training.disturbed import FACING, PLACE, disturbed, drawn, small_turns
 from training.hierarchy import Networks
-from training.networks import to_use
-from training.recordings import recordings
+from training.networks import ARRAYS, to_use
+from training.recordings import FACING, PLACE, disturbed, drawn, recordings, small_turns
 
 TARGETS = [(12.0, 2.0, 1.0), (9.0, -3.0, 0.4), (15.0, 0.0, 1.4)]
 

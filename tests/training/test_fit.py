@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import Cancelled, InputError
-from training import checkpoint
 from training.config import config_of
-from training.fit import batches, fit, rate_at, stretches
+from training.fit import batches, checkpoint_path, fit, rate_at, stretches
 
 TOP = Path(__file__).resolve().parents[2]
 CONFIG = config_of({"epochs": 12, "macro": 3, "batch": 16, "learning_rate": 0.05, "final_rate": 0.01, "seed": 3})
@@ -134,4 +133,4 @@ def test_no_example_long_enough_is_told():
 
 
 def test_the_checkpoint_stands_beside_the_weights(tmp_path):
-    assert checkpoint.path_of(tmp_path / "w.npz") == tmp_path / "w.checkpoint.npz"
+    assert checkpoint_path(tmp_path / "w.npz") == tmp_path / "w.checkpoint.npz"

@@ -6,9 +6,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from beyond_mocap.throws.networks import phase_function, phases
-from beyond_mocap.throws.networks.correct import bend_to
+from beyond_mocap.throws.networks import phases
+from beyond_mocap.throws.networks.limb_reach import bend_to
 from beyond_mocap.throws.networks.network import forward
+from beyond_mocap.throws.networks.phases import weigh_points
 
 SIZES = (6, 5, 5, 4)
 STEP = 1e-6
@@ -26,7 +27,7 @@ def made(points):
 
 def value(xp, weights, biases, x, phase, keep, answer):
     """One number out of the network: a weighted sum of what it answers."""
-    theta = phase_function.weights(phase, weights[0].shape[0], xp)
+    theta = weigh_points(phase, weights[0].shape[0], xp)
     return (forward(weights, biases, x, theta, xp, keep) * answer).sum()
 
 

@@ -4,8 +4,8 @@ import jax
 import numpy as np
 import pytest
 
-from beyond_mocap.throws.networks import phase_function
 from beyond_mocap.throws.networks.network import forward
+from beyond_mocap.throws.networks.phases import weigh_points
 from training.networks import RIDGES, first_weights, linear_start, sums
 
 ROWS, INPUTS, OUTPUTS = 3000, 6, 3
@@ -15,7 +15,7 @@ def planted(points):
     """Inputs, phases' weights and answers of a linear map for each control point, a little noise on them."""
     random = np.random.default_rng(points)
     weights, biases = random.normal(size=(points, OUTPUTS, INPUTS)), random.normal(size=(points, OUTPUTS))
-    x, theta = random.normal(size=(ROWS, INPUTS)), phase_function.weights(random.uniform(size=ROWS), points)
+    x, theta = random.normal(size=(ROWS, INPUTS)), weigh_points(random.uniform(size=ROWS), points)
     y = np.einsum("nk,koi,ni->no", theta, weights, x) + theta @ biases
     return x, theta, y + 0.001 * random.normal(size=y.shape), weights
 

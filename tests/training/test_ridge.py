@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import Cancelled
-from training import ridge
+from training import train
 from training.networks import RIDGES
 
 
@@ -17,12 +17,12 @@ def examples(*subjects):
 
 
 def test_the_last_subject_is_left_out_whole():
-    assert ridge.held_out(examples("a", "b", "a", "c")).tolist() == [False] * 6 + [True] * 2
+    assert train.held_out(examples("a", "b", "a", "c")).tolist() == [False] * 6 + [True] * 2
 
 
 def test_of_one_subject_a_fourth_is_left_out_with_its_mirror_images():
-    assert np.flatnonzero(ridge.held_out(examples(*"aaaaaaaaa"))).tolist() == [6, 7, 14, 15]
-    assert not ridge.held_out(examples(*"aaa")).any()
+    assert np.flatnonzero(train.held_out(examples(*"aaaaaaaaa"))).tolist() == [6, 7, 14, 15]
+    assert not train.held_out(examples(*"aaa")).any()
 
 
 class Straying:
@@ -46,12 +46,12 @@ class Straying:
     ([1, 1, 1, 1, 1, 1], RIDGES[-1]),
 ])
 def test_the_largest_ridge_of_the_best_is_taken(monkeypatch, off, expected):
-    monkeypatch.setattr(ridge, "_off", lambda model, example: model)
+    monkeypatch.setattr(train, "_off", lambda model, example: model)
     held = examples("a")
-    assert ridge.least_astray(Straying(off), held, lambda params, line: params) == expected
+    assert train.least_astray(Straying(off), held, lambda params, line: params) == expected
 
 
 def test_nothing_left_out_and_cancelled():
-    assert ridge.least_astray(None, [], None) == RIDGES[-1]
+    assert train.least_astray(None, [], None) == RIDGES[-1]
     with pytest.raises(Cancelled):
-        ridge.least_astray(Straying([1] * 6), examples("a"), lambda params, line: params, lambda: True)
+        train.least_astray(Straying([1] * 6), examples("a"), lambda params, line: params, lambda: True)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.humanoid import Limb, identify_posed
+from ...motion.humanoid import identify_posed
 from ...motion.motion import Motion, forward_kinematics, local_rotations, pose_kinematics
 from ...motion.retargeting.anatomy import Anatomy, head_chain, study
 from ...motion.skeleton import Skeleton
@@ -54,12 +54,8 @@ def _named(skeleton: Skeleton, anatomy: Anatomy) -> dict[str, int]:
     above = ["Neck", *(f"Neck{i}" for i in range(1, len(chain)))][: max(len(chain) - 1, 0)] + ["Head"]
     found |= dict(zip(above if chain else [], chain))
     for side, limb in (("Left", body.left), ("Right", body.right)):
-        found |= {side + name: joint for name, joint in _limb(limb).items() if joint in anatomy.known}
+        found |= {side + name: getattr(limb, part) for part, name in _PARTS.items()}
     return {name: joint for name, joint in found.items() if joint in anatomy.known}
-
-
-def _limb(limb: Limb) -> dict[str, int]:
-    return {name: getattr(limb, part) for part, name in _PARTS.items() if getattr(limb, part) is not None}
 
 
 def _segment(name: str, world: np.ndarray, axes: np.ndarray) -> np.ndarray:

@@ -4,6 +4,14 @@
     known = planted(clip, "plug_in_gait", seed=1, occlusion=0.05)
     known.trial, known.static      what a laboratory would hand over
     known.motion, known.centres    what is to be found again
+    planted_error(known, found)    how far a reconstruction is from it
+
+`Faults` is what goes wrong while markers are recorded: hidden markers, exchanged labels, stray samples, lost labels.
+Errors of a reconstruction: of centres, the distance of the joints that anatomy defines (hips, knees, ankles, shoulders,
+elbows, wrists), frame by frame, as they lie in the world; of angles, each segment against the one above it, two ways:
+`raw` compares the segments' axes as they are; `angles` first takes off, from each segment, the one constant turn
+between found and true axes that fits the whole clip best: where a model draws a segment's axes is its convention, how
+the segment moves is not. Errors are the whole angle between found and true joint rotation, all three axes at once.
 """
 
 from __future__ import annotations
@@ -14,15 +22,29 @@ from itertools import combinations
 import numpy as np
 
 from ...base.errors import InputError
+from ...markers.frames import mean_rotation
 from ...markers.trial import MarkerTrial
+from ...motion import quaternion
 from ...motion.motion import Motion, forward_kinematics
 from .planted_ball import BallTruth, PlantedBall, planted_ball
 from .planted_body import calibration_pose, in_marker_axes
-from .planted_faults import Fault, Faults
-from .planted_places import SETS, STATIC_ONLY, Placed, placed
-from .planted_skin import on_skin
+from .planted_places import SETS, STATIC_ONLY, Placed, on_skin, placed
 
 _STATIC_SECONDS, _STATIC_FPS = 3.0, 100.0
+_SHORTEST, _USUAL, _LONGEST = 0.03, 0.15, 1.0  # seconds that a marker stays hidden
+_SWAPPED = (0.15, 0.7)  # seconds that two labels stay exchanged
+_STRAY = (0.02, 0.12)  # metres by which a stray sample is off
+_TRIES = 400
+_PARTS = ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")
+CENTRES = tuple(side + part for side in ("Left", "Right") for part in _PARTS)
+ABOVE = {
+    "Chest": "Hips", "Head": "Chest",
+    **{side + part: above if above in ("Hips", "Chest") else side + above
+       for side in ("Left", "Right")
+       for part, above in (("UpLeg", "Hips"), ("Leg", "UpLeg"), ("Foot", "Leg"), ("Arm", "Chest"), ("ForeArm", "Arm"),
+                           ("Hand", "ForeArm"))},
+}  # fmt: skip
+"""Joint -> the segment against which its angle counts: the trunk as one, from pelvis to chest."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,16 +80,8 @@ class Planted:
 
 
 def planted(
-    motion: Motion,
-    marker_set: str | tuple[str, ...] = "plug_in_gait",
-    seed: int = 0,
-    *,
-    noise: float = 0.0005,
-    softness: float = 1.0,
-    occlusion: float = 0.0,
-    swaps: int = 0,
-    jumps: int = 0,
-    unlabeled: int = 0,
+    motion: Motion, marker_set: str | tuple[str, ...] = "plug_in_gait", seed: int = 0, *, noise: float = 0.0005,
+    softness: float = 1.0, occlusion: float = 0.0, swaps: int = 0, jumps: int = 0, unlabeled: int = 0,
     ball: PlantedBall | None = None,
 ) -> Planted:
     """Markers on any humanoid `motion`, and a static trial of the same body.
@@ -127,3 +141,183 @@ def _exchangeable(markers: Placed, labels: tuple[str, ...]) -> list[tuple[str, s
     pairs = [two for two in combinations(labels, 2) if joint[two[0]] == joint[two[1]]]
     twins = [(label, "R" + label[1:]) for label in labels if label[0] == "L" and "R" + label[1:] in labels]
     return sorted({*pairs, *twins})
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One thing that was done to a trial. kind: "gap", "swap", "jump" or "unlabeled". labels: the marker, or the two
+    that are exchanged, or the marker and the label under which it goes on. frames start .. stop-1."""
+
+    kind: str
+    labels: tuple[str, ...]
+    start: int
+    stop: int
+
+
+class Faults:
+    """A trial on which faults are laid, never two on one sample."""
+
+    def __init__(self, trial: MarkerTrial, seed: int):
+        self.trial = trial
+        self.labels = list(trial.labels)
+        self.positions = trial.positions.copy()
+        self.free = trial.seen.copy()
+        self.rng = np.random.default_rng(seed)
+        self.done: list[Fault] = []
+
+    def occlude(self, share: float) -> None:
+        """Hides markers for stretches until `share` of all samples is gone; never more than half of them at once."""
+        if not 0.0 <= share < 0.5:
+            raise InputError("planted markers", f"{share:g} of the samples hidden", "0 up to 0.5")
+        wanted = int(share * self.free.size)
+        for _ in range(_TRIES * self.free.shape[1]):
+            if wanted <= 0:
+                return
+            seconds = np.clip(self.rng.lognormal(np.log(_USUAL), 0.7), _SHORTEST, _LONGEST)
+            marker = int(self.rng.integers(len(self.trial.labels)))
+            start, stop = self._stretch(seconds)
+            gone = ~np.isfinite(self.positions[start:stop, :, 0])
+            if self.free[start:stop, marker].all() and (gone.mean(axis=1) < 0.5).all():
+                self.positions[start:stop, marker] = np.nan
+                wanted -= stop - start
+                self._mark("gap", (marker,), start, stop)
+
+    def swap(self, pairs: list[tuple[str, str]], count: int) -> None:
+        """Exchanges the labels of `count` pairs for a stretch each."""
+        for _ in range(_TRIES):
+            if count <= 0 or not pairs:
+                return
+            two = [self.labels.index(label) for label in pairs[int(self.rng.integers(len(pairs)))]]
+            start, stop = self._stretch(self.rng.uniform(*_SWAPPED))
+            if self.free[start:stop, two].all():
+                self.positions[start:stop, two] = self.positions[start:stop, two[::-1]]
+                count -= 1
+                self._mark("swap", two, start, stop)
+
+    def stray(self, count: int) -> None:
+        """Throws single samples off by some centimetres."""
+        for _ in range(_TRIES):
+            if count <= 0:
+                return
+            marker, frame = (int(self.rng.integers(size)) for size in self.free.shape[::-1])
+            if self.free[frame, marker]:
+                way = self.rng.normal(size=3)
+                self.positions[frame, marker] += way / np.linalg.norm(way) * self.rng.uniform(*_STRAY)
+                count -= 1
+                self._mark("jump", (marker,), frame, frame + 1)
+
+    def unlabel(self, count: int) -> None:
+        """Lets `count` stretches go on as `*1`, `*2` ... while the marker's own label sees nothing."""
+        number = 0
+        for _ in range(_TRIES):
+            if number >= count:
+                return
+            marker = int(self.rng.integers(len(self.trial.labels)))
+            start, stop = self._stretch(self.rng.uniform(*_SWAPPED))
+            if self.free[start:stop, marker].all():
+                number += 1
+                column = np.full((len(self.positions), 1, 3), np.nan)
+                column[start:stop, 0] = self.positions[start:stop, marker]
+                self.positions[start:stop, marker] = np.nan
+                self.positions = np.concatenate([self.positions, column], axis=1)
+                self.labels.append(f"*{number}")
+                self._mark("unlabeled", (marker, len(self.labels) - 1), start, stop)
+
+    def faulty(self) -> tuple[MarkerTrial, tuple[Fault, ...]]:
+        """The trial as it came out, and what was done to it in the order of time."""
+        trial = MarkerTrial(labels=tuple(self.labels), positions=self.positions, fps=self.trial.fps,
+                            start=self.trial.start, name=self.trial.name, subject=self.trial.subject)
+        return trial, tuple(sorted(self.done, key=lambda fault: (fault.start, fault.labels)))
+
+    def _stretch(self, seconds: float) -> tuple[int, int]:
+        """Frames of a stretch somewhere in the trial, not at its very ends."""
+        length = min(max(int(round(seconds * self.trial.fps)), 1), max(len(self.positions) // 3, 1))
+        start = int(self.rng.integers(1, max(len(self.positions) - length, 2)))
+        return start, min(start + length, len(self.positions))
+
+    def _mark(self, kind: str, markers, start: int, stop: int) -> None:
+        """Keeps a stretch, and some frames around it, from being touched again."""
+        around = max(int(0.05 * self.trial.fps), 2)
+        own = [marker for marker in markers if marker < self.free.shape[1]]
+        self.free[max(start - around, 0) : stop + around, own] = False
+        self.done.append(Fault(kind, tuple(self.labels[marker] for marker in markers), start, stop))
+
+
+def mirrored(trial: MarkerTrial) -> MarkerTrial:
+    """The trial as a left-handed system would write it: left and right of the room exchanged, labels kept."""
+    return trial.with_positions(trial.positions * [1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class PlantedError:
+    """centres: joint -> root mean square distance, metres. angles, raw: joint -> root mean square angle, radians, with
+    and without each segment's constant offset taken off. worst_centre: metres, 95th percentile over joints and frames.
+    """
+
+    centres: dict[str, float]
+    angles: dict[str, float]
+    raw: dict[str, float]
+    worst_centre: float
+
+    @property
+    def centre(self) -> float:
+        """Root mean square over all joints, metres."""
+        return _rms(self.centres.values())
+
+    @property
+    def angle(self) -> float:
+        """Root mean square over all joints, radians, offsets taken off."""
+        return _rms(self.angles.values())
+
+    @property
+    def raw_angle(self) -> float:
+        """Root mean square over all joints, radians, offsets left in."""
+        return _rms(self.raw.values())
+
+
+def planted_error(known: Planted, found: Motion) -> PlantedError:
+    """How far `found`, on any skeleton whose joints have the template's names, is from the truth, frame by frame."""
+    true_places, true_turns = _by_name(known.motion)
+    places, turns = _by_name(found)
+    count = min(len(known.motion), len(found))
+    apart = {
+        joint: np.linalg.norm(places[joint][:count] - true_places[joint][:count], axis=1)
+        for joint in CENTRES
+        if joint in places and joint in true_places
+    }
+    there = [joint for joint in ("Hips", *ABOVE) if joint in turns and joint in true_turns]
+    aligned = {joint: _aligned(turns[joint][:count], true_turns[joint][:count]) for joint in there}
+    pairs = [(joint, above) for joint, above in ABOVE.items() if joint in there and above in there]
+    return PlantedError(
+        {joint: _rms(distance) for joint, distance in apart.items()},
+        {joint: _off(aligned[joint], aligned[above], true_turns[joint][:count], true_turns[above][:count])
+         for joint, above in pairs},
+        {joint: _off(turns[joint][:count], turns[above][:count], true_turns[joint][:count], true_turns[above][:count])
+         for joint, above in pairs},
+        float(np.percentile(np.stack(list(apart.values())), 95)) if apart else float("nan"),
+    )
+
+
+def _by_name(motion: Motion) -> tuple[dict, dict]:
+    """Joint -> places (T, 3) and turns (T, 4) in the world."""
+    places, turns = forward_kinematics(motion)
+    names = motion.skeleton.names
+    return {n: places[:, i] for i, n in enumerate(names)}, {n: turns[:, i] for i, n in enumerate(names)}
+
+
+def _aligned(found: np.ndarray, true: np.ndarray) -> np.ndarray:
+    """Turns (T, 4) of a segment in the axes in which they come nearest to the true ones."""
+    offset = mean_rotation(quaternion.to_matrix(quaternion.multiply(quaternion.inverse(true), found)))
+    return quaternion.multiply(found, quaternion.inverse(quaternion.from_matrix(offset)))
+
+
+def _off(found, found_above, true, true_above) -> float:
+    bend = quaternion.multiply(quaternion.inverse(found_above), found)
+    wanted = quaternion.multiply(quaternion.inverse(true_above), true)
+    angle = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(wanted), bend))
+    return _rms(np.linalg.norm(angle, axis=1))
+
+
+def _rms(values) -> float:
+    values = np.asarray(list(values), dtype=float)
+    return float(np.sqrt(np.mean(values**2))) if len(values) else float("nan")

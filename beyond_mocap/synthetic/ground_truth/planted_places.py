@@ -1,10 +1,15 @@
-"""Where markers lie on a body: the places of real marker sets, for bodies in the axes of marker models.
+"""Where markers lie on a body, and how skin moves them: real marker sets, for bodies in the axes of marker models.
 
 Places follow the palpation points of Plug-in Gait (Vicon), the sets of baseball pitching and sprinting laboratories,
 and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis's four follow from its hip joints
 by Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width + 10.9 mm below and
 0.33 width + 7.3 mm beside the middle of the front spines) turned round. Each place scatters by some millimetres, as
 hands do that put markers on.
+
+Soft tissue has two parts, as measured on pins in bones (Cappozzo et al. 1996, Clin. Biomech. 11, 90-100; Camomilla et
+al. 2017, J. Biomech. 62, 5-13): a shift that follows the angles of the joints beside the segment, of which a share is
+common to the whole cluster (no rigid fit can see it) and the rest is each marker's own; and flesh that lags behind
+shocks as a damped mass does. Directions are drawn once for a body and a marker; they do not change from trial to trial.
 """
 
 from __future__ import annotations
@@ -13,12 +18,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...motion import quaternion
+from ...motion.motion import Motion, forward_kinematics
 from ...motion.skeleton import Skeleton
 from .planted_body import adult_share
 
 _FOOT = (0.133, 0.0, -0.054)  # m from an adult's ankle to the toe joint
 _HEEL = 0.034  # m by which a heel's marker lies below the ankle, at least
 _DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
+_COMMON = 0.45  # share of the shift that a whole cluster makes
+_RATE, _DAMPING = 11.0, 0.35  # Hz of wobbling flesh, and its damping ratio
+_LONGEST = 0.02  # m of lag behind the hardest shock
 
 
 @dataclass(frozen=True)
@@ -76,9 +86,8 @@ MIDDLE = {
     "CLAV": _trunk(62, 0, -15, 5.0), "MAN": _trunk(60, 0, -12, 5.0), "STRN": _trunk(92, 0, -150, 8.0),
     "RBAK": _trunk(-105, -95, -80, 9.0), "LBAK": _trunk(-105, 95, -80, 9.0),
     "SACR": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
-    "P1": Place(
-        "Hips", None, 0.0, offset=(-14, 0, -42), soft=5.0, wobble=0.5,
-    ), "P2": Place("Hips", None, 0.0, offset=(-10, 36, -22), soft=5.0, wobble=0.5),
+    "P1": Place("Hips", None, 0.0, offset=(-14, 0, -42), soft=5.0, wobble=0.5),
+    "P2": Place("Hips", None, 0.0, offset=(-10, 36, -22), soft=5.0, wobble=0.5),
     "P3": Place("Hips", None, 0.0, offset=(-10, -36, -22), soft=5.0, wobble=0.5),
 }  # fmt: skip
 SIDED = {
@@ -103,13 +112,11 @@ SIDED = {
     "MFL": _foot("ToeBase", -50, 46, 14), "TOE": _foot("ToeBase", 0, 2, 14), "P1MT": _foot("ToeBase", 4, -38, 12),
     "MT1": _foot("ToeBase", 4, -38, 12), "P5MT": _foot("ToeBase", -18, 44, 10), "MT5": _foot("ToeBase", -18, 44, 10),
     "HLX": Place("ToeBase", None, 0.0, offset=(55, -12, 14), soft=1.5, wobble=0.1),
-    "ASI": Place(
-        "Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4,
-    ), "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
+    "ASI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4),
+    "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
 }  # fmt: skip
-_ON_BLADE = Place(
-    "Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4,
-)  # where shoulder blades are tracked apart
+# where shoulder blades are tracked apart
+_ON_BLADE = Place("Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4)
 _PIG = (
     "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
     "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE"
@@ -134,9 +141,7 @@ SETS = {
             "RMANK LHEE LMT1 LMT5 RHEE RMT1 RMT5 LHLX RHLX"
         ).split()
     ),
-    "lower_body": tuple(
-        "LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()
-    ),
+    "lower_body": tuple("LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()),
 }
 """Labels of the marker sets that can be planted."""
 STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}
@@ -225,3 +230,63 @@ def _on_pelvis(skeleton: Skeleton, label: str) -> np.ndarray:
         local = np.array([forward - depth, 0.2 * width * side * label.endswith("PSI"), up])
     return 0.5 * (left + right) + tilted @ local
 
+
+def markers_on(motion: Motion, placed: Placed) -> np.ndarray:
+    """Markers (T, M, 3) metres, world, that stand still on their bones."""
+    positions, turns = forward_kinematics(motion)
+    return positions[:, placed.joint] + quaternion.rotate(turns[:, placed.joint], placed.places)
+
+
+def on_skin(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int, softness: float = 1.0) -> np.ndarray:
+    """Markers (T, M, 3) metres, world, that the skin carries over the bones.
+
+    neutral: (J, 4) local rotations in which no skin is shifted. softness: factor on all shifts; 0 is bone.
+    """
+    rigid = markers_on(motion, placed)
+    if softness <= 0.0:
+        return rigid
+    _, turns = forward_kinematics(motion)
+    shift = quaternion.rotate(turns[:, placed.joint], _shifts(motion, placed, neutral, seed))
+    return rigid + softness * (shift + placed.wobble[:, None] * _lag(rigid, motion.fps))
+
+
+def _shifts(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int) -> np.ndarray:
+    """What the joints' angles do to each marker (T, M, 3), metres in its segment's axes."""
+    rng = np.random.default_rng(seed)
+    bends = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(neutral), motion.rotations))
+    shifts = np.zeros((len(motion), len(placed.labels), 3))
+    for joint in np.unique(placed.joint):
+        beside = _beside(motion, int(joint), bends)
+        common = _directions(rng)
+        for marker in np.flatnonzero(placed.joint == joint):
+            mix = _COMMON * common + np.sqrt(1.0 - _COMMON**2) * _directions(rng)
+            shifts[:, marker] = placed.soft[marker] * beside @ mix
+    return shifts
+
+
+def _beside(motion: Motion, joint: int, bends: np.ndarray) -> np.ndarray:
+    """The bends (T, 6) radians of the joint above a segment (none for the root) and of the one below, levelled off
+    beyond a radian."""
+    children = motion.skeleton.children(joint)
+    own = bends[:, joint] if joint else np.zeros((len(motion), 3))
+    below = np.mean([bends[:, child] for child in children], axis=0) if children else np.zeros((len(motion), 3))
+    return np.tanh(np.concatenate([own, below], axis=1))
+
+
+def _directions(rng: np.random.Generator) -> np.ndarray:
+    """For each of six bends a direction of about unit length that the skin shifts in: (6, 3)."""
+    return rng.normal(0.0, 1.0 / np.sqrt(3.0), (6, 3)) * np.repeat([0.8, 0.6], 3)[:, None]
+
+
+def _lag(rigid: np.ndarray, fps: float) -> np.ndarray:
+    """How a damped mass on each marker lags behind it (T, M, 3), metres, at most some centimetres."""
+    from scipy.signal import cont2discrete, lfilter
+
+    pull = 2.0 * np.pi * _RATE
+    if fps < 4.0 * _RATE or len(rigid) < 8:
+        return np.zeros_like(rigid)
+    acceleration = np.gradient(np.gradient(rigid, axis=0), axis=0) * fps**2
+    above, below, _ = cont2discrete(([1.0], [1.0, 2.0 * _DAMPING * pull, pull**2]), 1.0 / fps, "bilinear")
+    lag = -lfilter(np.ravel(above), below, acceleration, axis=0)
+    length = np.linalg.norm(lag, axis=-1, keepdims=True)
+    return lag * np.where(length > 1e-9, _LONGEST * np.tanh(length / _LONGEST) / np.maximum(length, 1e-9), 1.0)

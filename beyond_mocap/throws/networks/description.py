@@ -86,13 +86,11 @@ def windows(description: Description, reference: np.ndarray | None = None) -> Wi
     points = places_at(description, seen)
     hands = description.hands
     return Windows(
-        points=np.swapaxes(points, 1, 2),
-        deltas=np.swapaxes(places_at(description, seen + 1.0) - points, 1, 2),
+        points=np.swapaxes(points, 1, 2), deltas=np.swapaxes(places_at(description, seen + 1.0) - points, 1, 2),
         next=places_at(description, frames + 1.0),
         hands_next=None if hands is None else hands[np.minimum(frames + 1, len(hands) - 1)],
         sides=np.broadcast_to(np.eye(2)[description.limb % 2], (len(frames), 2)),
-        impact=np.broadcast_to(description.impact, (len(frames), 3)),
-        phase=phases(description, reference),
+        impact=np.broadcast_to(description.impact, (len(frames), 3)), phase=phases(description, reference),
     )
 
 

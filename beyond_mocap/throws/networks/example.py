@@ -51,14 +51,7 @@ class Example:
 
 
 def example_of(
-    name: str,
-    subject: str,
-    motion: Motion,
-    limb: int | str,
-    release: float,
-    impact,
-    launch=None,
-    fps: float = 30.0,
+    name: str, subject: str, motion: Motion, limb: int | str, release: float, impact, launch=None, fps: float = 30.0,
     span: tuple[float, float] | None = None,
 ) -> Example:
     """An example from a motion in the world, floor at 0.
@@ -76,15 +69,10 @@ def example_of(
     taken, before, after = (_resampled(motion, frames, first, fps) for frames in _frames(motion, first, count, fps))
     turned = quaternion.about_up(np.array(turn))
     return Example(
-        name=name,
-        subject=subject,
-        motion=taken,
-        limb=EFFECTORS.index(limb) if isinstance(limb, str) else int(limb),
-        release=(release - first) * fps,
-        impact=quaternion.rotate(turned, np.asarray(impact, dtype=float)) + shift,
+        name=name, subject=subject, motion=taken, limb=EFFECTORS.index(limb) if isinstance(limb, str) else int(limb),
+        release=(release - first) * fps, impact=quaternion.rotate(turned, np.asarray(impact, dtype=float)) + shift,
         launch=None if launch is None else quaternion.rotate(turned, np.asarray(launch, dtype=float)),
-        stature=stature(motion.skeleton),
-        before=None if before is None else effectors_of(before),
+        stature=stature(motion.skeleton), before=None if before is None else effectors_of(before),
         after=None if after is None else effectors_of(after),
     )
 
@@ -130,13 +118,8 @@ def describe(example: Example) -> Description:
     places, turns = forward_kinematics(example.motion)
     joints = list(chains_of(example.motion.skeleton).effectors)
     return Description(
-        effectors=places[:, joints],
-        hands=quaternion.to_matrix(turns[:, joints[:2]]),
-        limb=example.limb,
-        release=example.release,
-        impact=example.impact,
-        fps=example.motion.fps,
-        before=example.before,
+        effectors=places[:, joints], hands=quaternion.to_matrix(turns[:, joints[:2]]), limb=example.limb,
+        release=example.release, impact=example.impact, fps=example.motion.fps, before=example.before,
         after=example.after,
     )
 
@@ -154,11 +137,7 @@ def mirrored(example: Example) -> Example:
         return None if effectors is None else effectors[:, [1, 0, 3, 2]] * (1.0, -1.0, 1.0)
 
     return replace(
-        example,
-        motion=mirror(example.motion),
-        limb=example.limb ^ 1,
-        impact=example.impact * (1.0, -1.0, 1.0),
-        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0),
-        before=side(example.before),
+        example, motion=mirror(example.motion), limb=example.limb ^ 1, impact=example.impact * (1.0, -1.0, 1.0),
+        launch=None if example.launch is None else example.launch * (1.0, -1.0, 1.0), before=side(example.before),
         after=side(example.after),
     )

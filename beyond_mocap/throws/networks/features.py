@@ -1,4 +1,4 @@
-"""What each network is told and what it answers (Fredriksson §7.2, §7.3), and how answers become a pose.
+"""What each network is told and what it answers (Fredriksson §7.2, §7.3), and how answers become a pose (`answers`).
 
 All functions are pure, take `xp` (numpy or jax.numpy) last and leave leading axes free. A network speaks of frame n + 1
 out of frame n: `pose` is the state in n, `after` what is known of n + 1 so far, in the order of `HIERARCHY`.
@@ -27,7 +27,7 @@ Where the text leaves something open, this is what was decided:
   r by which the limb of frame n, as it hangs on its reference in n + 1, would reach the wanted place (`reached`). The
   network says what it wants with them; nothing is corrected afterwards.
 - **Carried** (`carried`, ours): the hip network is also told where the hips of frame n would be if they went along with
-  hands and feet (`hip_guide.carried`). The ground under the hips as in all that it is told.
+  hands and feet (`carry_hips`). The ground under the hips as in all that it is told.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
 - **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
 """
@@ -38,14 +38,19 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...base.vectors import cross_level
 from .answers import network_output, origin, predicted
 from .chains import LIMB_OF, Chains
 from .description import Windows
-from .hip_guide import GUIDES, carried
 from .kinematics import Pose, flat, picked, pose_of, six, spread, transposed
 from .limb_reach import bent_limb, hinge_axes
 from .model import SINGLE, ModelSettings
 from .phases import distance_phase
+
+HIP_GUIDES = 9
+"""Values that `carry_hips` has."""
+_COUNTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # feet stand, hands swing
+_TINY = 1e-12  # m^2 about their middle; keeps the root's derivative finite
 
 
 def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
@@ -77,7 +82,7 @@ def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windo
     """(b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (§7.3)."""
     told = [*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)]
     if settings.carried:
-        told.append(carried(chains, pose, window, origin(chains, settings, pose), xp))
+        told.append(carry_hips(chains, pose, window, origin(chains, settings, pose), xp))
     return xp.concatenate(told, axis=-1)
 
 
@@ -104,9 +109,7 @@ def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
     ], axis=-1)  # fmt: skip
 
 
-def arm_input(
-    number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np
-):
+def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
     """(b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of the arm 0 (left) or 1 (§7.3)."""
     name = LIMB_OF[number]
     frame = _Frame(chains.references[name], pose, after, xp)
@@ -153,9 +156,9 @@ def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, af
 
 
 def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
-    """How many of a network's last inputs are what `reached` or, of the hip, `carried` says."""
+    """How many of a network's last inputs are what `reached` or, of the hip, `carry_hips` says."""
     if name == "hip":
-        return GUIDES if settings.carried else 0
+        return HIP_GUIDES if settings.carried else 0
     return 6 * len(predicted(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
 
 
@@ -237,3 +240,28 @@ def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
     """d: metres (..., 1) from a limb's first joint to where its end is to be in frame n + 1."""
     way = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
     return xp.sqrt(xp.sum(way * way, axis=-1, keepdims=True))
+
+
+def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
+    """Place less `origin` (..., 3) m, and turn as six numbers, of the hips as hands and feet carry them: (..., 9).
+
+    They are turned about the upright and moved as brings the effectors of frame n nearest to where they are wanted in
+    n + 1, in least squares in which feet count three times as much (Procrustes; Kabsch 1976 with one axis).
+    """
+    now = picked(pose.positions, chains.effectors, -2, xp)
+    share = _COUNTS[:, None]
+    middle, wanted = (now * share).sum(-2), (window.next * share).sum(-2)
+    a, b = share * (now - middle[..., None, :]), window.next - wanted[..., None, :]
+    along = (a[..., :2] * b[..., :2]).sum((-1, -2))
+    across = cross_level(a, b).sum(-1)
+    turn = _about_up(along, across, xp)
+    place = xp.matmul(turn, (pose.positions[..., chains.hips, :] - middle)[..., None])[..., 0] + wanted
+    return xp.concatenate([place - origin, six(xp.matmul(turn, pose.turns[..., chains.hips, :, :]), xp)], axis=-1)
+
+
+def _about_up(along, across, xp):
+    """Rotations (..., 3, 3) about the upright whose cosine and sine are as `along` (...) to `across` (...)."""
+    long = xp.sqrt(along * along + across * across + _TINY)
+    cosine, sine, nothing = along / long, across / long, xp.zeros_like(along)
+    rows = [[cosine, -sine, nothing], [sine, cosine, nothing], [nothing, nothing, nothing + 1.0]]
+    return xp.stack([xp.stack(row, -1) for row in rows], -2)

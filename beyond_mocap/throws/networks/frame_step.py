@@ -1,5 +1,6 @@
 """One frame after the other: what the networks say of the next frame, brought within the joints' limits and towards
-where hands and feet are wanted (Fredriksson §7.7)."""
+where hands and feet are wanted (Fredriksson §7.7). A hierarchy is asked by `OneFrame`, which says the same as
+`features` and `answers` do, without free axes and jax, as fast as numpy goes; tests hold both together."""
 
 from __future__ import annotations
 
@@ -9,20 +10,25 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from . import answers, features, phase_function
-from .chains import Chains, chains_of
+from . import answers, features
+from .chains import HIERARCHY, LIMB_OF, Chains, chains_of
 from .description import BACK, SAMPLES, STEP, Windows
 from .kinematics import Pose
 from .limb_reach import LimbReach, posed
 from .limits import JointLimits, learn
 from .model import SINGLE, ThrowModel
-from .one_frame import OneFrame
+from .phases import weigh_points_at
 
 _SETTLES = 0.12
 """Seconds in which tanh brings an offset trajectory back to the wanted one by three quarters (§7.7.3)."""
 
 _FELT = 2e-3
 """Radians that a limit takes off a joint from where its limb reaches again."""
+
+_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # no turn
+_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
+_TINY = 1e-12
+_GROUND = np.array([1.0, 1.0, 0.0])
 
 
 class Step(NamedTuple):
@@ -48,6 +54,7 @@ class Stepper:
         _check_widths(model, self.chains)
         self.limits = JointLimits(model.skeleton, _limits_of(model))
         self.effectors = list(self.chains.effectors)
+        self.floating_effectors = [self.chains.joints.index(joint) for joint in self.effectors]
         self.hierarchy = OneFrame(model, self.chains) if model.settings.kind == "hierarchy" else None
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
@@ -56,7 +63,7 @@ class Stepper:
         much of the way from what the networks say to there each is taken, None for none of them. limited: joints are
         kept within their limits, and networks asked only for what is near what they know."""
         after, floating = self.predicted(pose, window, limited)
-        said = after.positions[self.effectors] if floating is None else self._said(floating)
+        said = after.positions[self.effectors] if floating is None else floating[self.floating_effectors]
         over = np.zeros(len(self.model.skeleton))
         if limited and share is None:
             after, over = self._limited(after)
@@ -73,14 +80,11 @@ class Stepper:
         if self.hierarchy is not None:
             return self.hierarchy(pose, window, bounded), None
         network, settings = self.model.networks[SINGLE], self.model.settings
-        theta = phase_function.weights_at(float(window.phase), network.points)
+        theta = weigh_points_at(float(window.phase), network.points)
         x = features.single_input(self.chains, settings, pose, window)
         y = network.frame(np.clip(x, *network.bounds) if bounded else x, theta).astype(float)
         floating = answers.floating(self.chains, settings, y, pose)[0]
         return answers.answered(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
-
-    def _said(self, floating: np.ndarray) -> np.ndarray:
-        return floating[[self.chains.joints.index(joint) for joint in self.effectors]]
 
     def _afloat(self, pose: Pose, floating: np.ndarray) -> Pose:
         places = pose.positions.copy()
@@ -148,7 +152,165 @@ def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
     and back to the wanted ones by tanh (§7.7.3)."""
     left, change, following = _fading(fps)
     return window._replace(
-        points=window.points + offset[:, None, :] * left,
-        deltas=window.deltas + offset[:, None, :] * change,
+        points=window.points + offset[:, None, :] * left, deltas=window.deltas + offset[:, None, :] * change,
         next=window.next + offset * following,
     )
+
+
+class OneFrame:
+    """The networks of a hierarchy, ready to say one frame after the other. It keeps nothing between frames."""
+
+    def __init__(self, model: ThrowModel, chains: Chains):
+        """`model`: of kind hierarchy. `chains`: of its skeleton."""
+        settings = model.settings
+        self.chains, self.points = chains, settings.points
+        self.static, self.given = settings.frame == "static", settings.wrist == "given"
+        self.carried = settings.carried
+        self.networks = [model.networks[name].frame for name in HIERARCHY]
+        self.bounds = [model.networks[name].bounds for name in HIERARCHY]
+        self.reach = [model.leg_reach[name[:-4]] for name in LIMB_OF[2:]]
+        parents, offsets = chains.skeleton.parents, chains.skeleton.offsets
+        self.plans = {name: [(joint, parents[joint], offsets[joint]) for joint in chains.known[name]]
+                      for name in HIERARCHY}  # fmt: skip
+        self.said = [list(answers.predicted(name, chains, settings)) for name in HIERARCHY]
+        self.limb_joints = [joint for said in self.said[2:] for joint in said]
+        self.hip_sees, self.body_sees = list(chains.hip_sees), list(chains.body_sees)
+        self.references = [chains.references[name] for name in LIMB_OF]
+        self.sockets, self.trunk = list(chains.sockets), list(chains.trunk)
+        self.others = [[self.trunk.index(joint) for joint in seen] for seen in chains.arm_sees]
+        self.leg_sees = list(chains.leg_sees)
+        self.guide = LimbReach(chains, None, True) if settings.guided else None
+
+    def __call__(self, pose: Pose, window: Windows, bounded: bool = False) -> Pose:
+        """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n. bounded: networks
+        are asked nothing that lies further off than `network.BOUND` (`PhaseNetwork.bounds`)."""
+        theta = np.array(weigh_points_at(float(window.phase), self.points), np.float32)
+        after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
+        sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
+        relative = pose.local.swapaxes(1, 2)[:, :2].reshape(-1, 6)
+        after = self._hips(after, self._ask(0, self._hip_input(pose, window, sixes), theta, bounded), pose)
+        turns = _rotations(self._ask(1, self._body_input(pose, after, window, relative), theta, bounded))
+        after.local[self.said[1]] = turns
+        _spread(self.plans["body"], after, {})
+        turns = _rotations(self._limbs(pose, after, window, relative=relative, theta=theta, bounded=bounded))
+        after.local[self.limb_joints] = turns
+        for number, name in enumerate(LIMB_OF):
+            hand = self.given and number < 2
+            given = {self.chains.effectors[number]: window.hands_next[number]} if hand else {}
+            _spread(self.plans[name], after, given)
+        return after
+
+    def _ask(self, number: int, x: np.ndarray, theta: np.ndarray, bounded: bool) -> np.ndarray:
+        if bounded:
+            x = np.minimum(np.maximum(x, self.bounds[number][0]), self.bounds[number][1])
+        return self.networks[number](x, theta)
+
+    def _hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
+        start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
+        trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
+        places = pose.positions[self.hip_sees] - start
+        guide = [features.carry_hips(self.chains, pose, window, start)] if self.carried else []
+        return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees], *guide)
+
+    def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
+        """The body with its hips where the first network says; joints above them only move."""
+        y, hips, offsets = y.astype(float), self.chains.hips, self.chains.skeleton.offsets
+        place = y[:3] + (0.0 if self.static else pose.positions[hips] * _GROUND)
+        turn = _rotations(y[3:])[0]
+        root, above = place, None
+        for joint in (*self.chains.above, hips):
+            if joint:
+                root = root - above @ offsets[joint]
+            above = after.local[joint] if above is None else above @ after.local[joint]
+        after = after._replace(root=root)
+        _spread(self.plans["hip"], after, {hips: turn})
+        return after
+
+    def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
+        joint = self.chains.references["body"]
+        origin, axes = after.positions[joint], after.turns[joint]
+        trajectories = np.concatenate([window.points[:2] - origin, window.deltas[:2]], axis=1) @ axes
+        toes, impact = (window.next[2:] - origin) @ axes, (window.impact - origin) @ axes
+        turned = _six(pose.turns[joint].T @ axes) - _SIX
+        places = (pose.positions[self.body_sees] - origin) @ axes
+        return _row(window.sides, impact, trajectories, toes, turned, relative[self.said[1]], places,
+                    _six(axes.T @ pose.turns[self.body_sees]))  # fmt: skip
+
+    def _limbs(
+        self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray, bounded: bool
+    ) -> np.ndarray:
+        """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
+        origins, axes = after.positions[self.references][:, None], after.turns[self.references]
+        back = axes.swapaxes(1, 2)
+        ways = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
+        turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
+        sockets = after.positions[self.sockets]
+        stretch = np.sqrt(((window.next - sockets) ** 2).sum(-1))
+        trunk = (after.positions[self.trunk] - origins[:2]) @ axes[:2]
+        above = np.concatenate([after.positions[self.chains.head][None], sockets[:2]])
+        others = *(trunk[arm, self.others[arm]] for arm in (0, 1)), *((above - origins[2:]) @ axes[2:])
+        turns = *_six(back[:2, None] @ after.turns[self.trunk]), *_six(back[2:, None] @ after.turns[self.leg_sees])
+        hands = _six(back[:2] @ window.hands_next) if self.given else ()
+        answers, guides = [], self._guides(after, window)
+        for number in range(4):
+            arm = number < 2
+            x = _row(*([window.sides] if arm else []), ways[number], turned[number],
+                     *([hands[number]] if arm and self.given else []), stretch[number : number + 1],
+                     relative[self.said[2 + number]], others[number], turns[number], *guides[number])  # fmt: skip
+            answers.append(self._ask(
+                2 + number, x, theta if arm else self._leg_theta(number, stretch[number]), bounded))
+        return np.concatenate(answers)
+
+    def _guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:
+        """Of each limb what `features.reached` says, nothing where the model is not guided. The limbs in `after` are
+        left as they hang on the body of the next frame with the rotations of this one."""
+        if self.guide is None:
+            return [[]] * 4
+        for name in LIMB_OF:
+            _spread(self.plans[name], after, {})
+        sixes = _six(self.guide.all_the_way(after, window.next))
+        return [[sixes[said]] for said in self.said[2:]]
+
+    def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
+        """Control point weights of a leg that reaches `stretch` metres (eq. 7.3)."""
+        low, high = self.reach[number - 2]
+        return np.array(weigh_points_at((float(stretch) - low) / (high - low), self.points), np.float32)
+
+
+def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
+    """Puts the joints of a plan (joint, parent, offset), parents first, in `after` itself, where its local rotations
+    bring them. given: turns in the world."""
+    local, places, turns = after.local, after.positions, after.turns
+    for joint, parent, offset in plan:
+        if parent < 0:
+            local[joint] = turns[joint] = given.get(joint, local[joint])
+            places[joint] = after.root
+            continue
+        base = turns[parent]
+        if joint in given:
+            turns[joint] = given[joint]
+            local[joint] = base.T @ given[joint]
+        else:
+            np.dot(base, local[joint], out=turns[joint])
+        places[joint] = places[parent] + base @ offset
+
+
+def _row(*parts: np.ndarray) -> np.ndarray:
+    """Parts as one input, float32."""
+    return np.concatenate([part.reshape(-1) for part in parts], dtype=np.float32, casting="same_kind")
+
+
+def _six(turns: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) as (..., 6)."""
+    return turns.swapaxes(-1, -2)[..., :2, :].reshape(*turns.shape[:-2], 6)
+
+
+def _rotations(values: np.ndarray) -> np.ndarray:
+    """The rotations (N, 3, 3) nearest to values (6 N,): Gram-Schmidt, the x axis first."""
+    both = values.astype(float).reshape(-1, 2, 3)
+    first, second = both[:, 0], both[:, 1]
+    first = first / np.sqrt((first * first).sum(1)[:, None] + _TINY)
+    second = second - (first * second).sum(1)[:, None] * first
+    second = second / np.sqrt((second * second).sum(1)[:, None] + _TINY)
+    third = first[:, _NEXT] * second[:, _LAST] - first[:, _LAST] * second[:, _NEXT]
+    return np.stack([first, second, third], axis=2)

@@ -143,9 +143,7 @@ def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local:
         turns[joint] = xp.matmul(base, changed[joint] if joint in changed else pose.local[..., joint, :, :])
         places[joint] = start + xp.matmul(base, skeleton.offsets[joint])
     return pose._replace(
-        root=root,
-        local=_put(pose.local, changed, -3, xp),
-        positions=_put(pose.positions, places, -2, xp),
+        root=root, local=_put(pose.local, changed, -3, xp), positions=_put(pose.positions, places, -2, xp),
         turns=_put(pose.turns, turns, -3, xp),
     )
 

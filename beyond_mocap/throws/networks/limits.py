@@ -6,6 +6,13 @@ the mean the vectors are short, also where a rig's rest pose lies far from how t
 seam. A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular
 velocities"); `within` brings it back.
 
+`LimbLimits` are those of a model's limb on other bones: of any rig that its motions are brought to, and of the mirror
+image. Retargeting and mirroring carry whole segments over, so that a joint of the other body has, up to a fixed turn
+(with a reflection, where mirrored) of its axes, the world rotation of the model's: W' = M W B. The turns B are read off
+a motion that stands on both bodies, as the nearest orthogonal matrices to the mean of W^T M W'; then a joint with
+parent p is judged as the model's would be that has the local rotation B_p L' B^T. What inverse kinematics of legs and a
+collar bone that is missing change is left over: the mean takes no part of it, so it counts as bent.
+
 As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest and highest offset (rad) of each joint.
 """
 
@@ -21,7 +28,9 @@ from ...base.errors import InputError
 from ...base.vectors import arctan2, unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import identify
+from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import Skeleton, frozen_array
+from .kinematics import transposed
 
 FREE = 4.0
 """Radians: offsets never get so long, so a joint with this range is free."""
@@ -37,6 +46,9 @@ _TINY = 1e-12  # metres: what is shorter has no direction
 _ONES = np.ones(3)
 _PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
 _PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
+
+_MIRROR = np.diag([1.0, -1.0, 1.0])
+_FRAMES = 24  # of a motion that tell how axes lie
 
 
 def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
@@ -206,3 +218,55 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
     if np.linalg.norm(across) < np.sin(_CLEAR):
         return None
     return Hinge(joint=lower, end=end, across=unit_vector(across, least=_TINY), along=along, bone=skeleton.offsets[end])
+
+
+@dataclass(frozen=True, eq=False)
+class LimbLimits:
+    """Limits of one limb on a body. limits: of the model's limb alone. joints: the body's, as many. above, axes:
+    (C, 3, 3), from the axes of the joints' parents and of the joints to those of the model's."""
+
+    limits: JointLimits
+    joints: tuple[int, ...]
+    above: np.ndarray
+    axes: np.ndarray
+
+    @classmethod
+    def of(
+        cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], shown: Motion, joints: tuple[int, ...],
+        mirrored: bool = False,
+    ) -> LimbLimits:
+        """The limits of a model's limb `own_joints` for the limb `joints` of `shown`, which shows `own`, a motion of
+        the model's skeleton, frame by frame, at the same place. mirrored: it shows its mirror image at y = 0."""
+        frames = np.unique(np.linspace(0, len(own) - 1, _FRAMES).astype(int))
+        poses = [(m.skeleton, m.root_positions[frames], m.rotations[frames]) for m in (own, shown)]
+        turns = [quaternion.to_matrix(pose_kinematics(*pose)[1]) for pose in poses]
+        image = _MIRROR if mirrored else np.eye(3)
+
+        def between(theirs: list[int], mine: list[int]) -> np.ndarray:
+            both = transposed(turns[0][:, theirs]) @ image @ turns[1][:, mine]
+            left, _, right = np.linalg.svd(both.mean(axis=0))
+            return left @ right
+
+        parents = [
+            [motion.skeleton.parents[joint] for joint in limb] for motion, limb in ((own, own_joints), (shown, joints))
+        ]
+        return cls(
+            limits.of_joints(own_joints), tuple(joints), between(*parents), between(list(own_joints), list(joints))
+        )
+
+    def held(self, rotations: np.ndarray, given: np.ndarray) -> np.ndarray:
+        """Local rotations (W, C, 4) of the limb's joints brought within their limits; where `given` (W, C, 4) lies
+        beyond them, no further than that."""
+        local, over = self.limits.within(self._carried(rotations), self._carried(given))
+        if not over.any():
+            return rotations
+        back = quaternion.from_matrix(transposed(self.above) @ local @ self.axes)
+        return np.where(over[..., None] > 0.0, quaternion.signed_like(back, rotations), rotations)
+
+    def beyond(self, motion: Motion) -> np.ndarray:
+        """(T, C) rad by which the limb's joints are beyond their limits."""
+        return self.limits.beyond(self._carried(motion.rotations[:, list(self.joints)]))
+
+    def _carried(self, rotations: np.ndarray) -> np.ndarray:
+        """(..., C, 3, 3): as the model's joints would be turned."""
+        return self.above @ quaternion.to_matrix(rotations) @ transposed(self.axes)

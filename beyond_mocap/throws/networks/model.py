@@ -40,7 +40,7 @@ class ModelSettings:
     (§9.3). ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were
     trained on what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would
     reach (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
-    (`hip_guide.carried`). fps: frames per second. action: throw or kick.
+    (`features.carry_hips`). fps: frames per second. action: throw or kick.
     """
 
     kind: str = "hierarchy"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...motion.skeleton import frozen_array
-from . import phase_function
+from .phases import weigh_points
 
 BOUND = 8.0
 """Standard deviations from the mean of the training data within which a network knows what it says."""
@@ -101,7 +101,7 @@ class PhaseNetwork:
 
     def predict(self, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
         """Outputs (..., out) for inputs (..., in) at phases (...) of 0 .. 1, in the precision of weights and inputs."""
-        theta = phase_function.weights(phase, self.points)
+        theta = weigh_points(phase, self.points)
         normal = (x - self.input_mean) / self.input_scale
         return forward(self.weights, self.biases, normal, theta) * self.output_scale + self.output_mean
 
@@ -133,7 +133,7 @@ class FrameNetwork:
         ]
 
     def __call__(self, x: np.ndarray, theta: np.typing.ArrayLike) -> np.ndarray:
-        """Outputs (out,) float32 for inputs (in,), at control point weights (K,) (`phase_function.weights`)."""
+        """Outputs (out,) float32 for inputs (in,), at control point weights (K,) (`weigh_points`)."""
         x, theta = np.asarray(x, np.float32), np.asarray(theta, np.float32)
         last = len(self._layers) - 1
         for layer, (weight, bias) in enumerate(self._layers):

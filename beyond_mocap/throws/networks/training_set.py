@@ -1,4 +1,4 @@
-"""Examples as what networks learn from: inputs, answers and phases of all their steps."""
+"""What networks learn from: the steps of all examples, their mirror images, their skeleton and their reach."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.errors import InputError
-from .answers import network_output
 from .chains import LIMB_OF, Chains, chains_of
 from .description import Description, Windows, windows
 from .example import Example, describe, mirrored, poses
-from .features import network_input, phase_of, stretch
+from .features import stretch
 from .kinematics import Pose
-from .model import ModelSettings
 from .phases import reference_curve
 
 _MARGIN = 1e-6  # metres by which a leg's reach is widened, so that it is a range even where nothing moves
@@ -28,14 +26,6 @@ class Steps(NamedTuple):
     window: Windows
 
 
-class TrainingSet(NamedTuple):
-    """inputs (N, in), answers (N, out) and phases (N,) of one network; N steps of all examples one after the other."""
-
-    inputs: np.ndarray
-    answers: np.ndarray
-    phases: np.ndarray
-
-
 def steps(example: Example, reference: np.ndarray | None = None) -> Steps:
     """The example's steps. reference: the speed curve for warped phases."""
     states, window = poses(example), windows(describe(example), reference)
@@ -45,27 +35,6 @@ def steps(example: Example, reference: np.ndarray | None = None) -> Steps:
 def joined(all_steps: Sequence[Steps]) -> Steps:
     """The steps of several examples as those of one."""
     return Steps(*(_stacked([steps[i] for steps in all_steps]) for i in range(3)))
-
-
-def training_set(
-    examples: Iterable[Example], settings: ModelSettings, mirrors: bool = False
-) -> dict[str, TrainingSet]:
-    """What each network of `settings.networks` learns from. mirrors: with the mirror image of each example too.
-
-    All examples have the same skeleton. InputError where there is none or they differ.
-    """
-    examples = with_mirrors(examples) if mirrors else list(examples)
-    chains = shared_chains(examples)
-    reference = reference_of(examples) if settings.phase == "warped" else None
-    reach, whole = leg_reach(examples), joined([steps(example, reference) for example in examples])
-    return {
-        name: TrainingSet(
-            network_input(name, chains, settings, *whole),
-            network_output(name, chains, settings, whole.pose, whole.after),
-            phase_of(name, chains, whole.after, whole.window, reach),
-        )
-        for name in settings.networks
-    }
 
 
 def with_mirrors(examples: Iterable[Example]) -> list[Example]:

@@ -31,9 +31,8 @@ def work_once(extension):
 @pytest.fixture(autouse=True)
 def usual_model(monkeypatch):
     """Bodies throw by that model."""
-    throws = importlib.import_module(f"{EXTENSION}.beyond_mocap.throws.throw")
-    read = importlib.import_module(f"{EXTENSION}.beyond_mocap.throws.network_npz").read_model
-    monkeypatch.setattr(throws, "shipped_model", lambda action: read(model_file(action)))
+    files = importlib.import_module(f"{EXTENSION}.beyond_mocap.throws.network_npz")
+    monkeypatch.setattr(files, "shipped_model", lambda action: files.read_model(model_file(action)))
 
 
 @pytest.fixture

@@ -5,8 +5,7 @@ import pytest
 
 from beyond_mocap.ball.tracked.solve import solve
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
+from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
 
 PLACES = np.array([[0.0, 0.0], [14.0, 3.0], [20.0, -9.0], [4.0, -12.0], [-9.0, -3.0]])
 NAMES = [f"home_{number}" for number in range(len(PLACES))]
@@ -143,7 +142,7 @@ def test_samples_told_twice_leave_the_players_where_they_are():
 @pytest.mark.parametrize("fps, heights", [(25.0, True), (10.0, False)])
 def test_a_made_match_is_solved(fps, heights):
     match = planted_match(45.0, 4)
-    feed = sampled(match, fps=fps, heights=heights)
+    feed = sample_feed(match, fps=fps, heights=heights)
     solved = solve(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
     touches = [(touch.time, touch.player) for touch in match.touches if 1.0 < touch.time < 44.0]
     recall, precision = share_found(touches, solved, 0.1)

@@ -10,8 +10,7 @@ from beyond_mocap.markers.checks import check, unused
 from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.model.assemble import model_from_frame
 from beyond_mocap.synthetic.gait import gait
-from beyond_mocap.synthetic.ground_truth.planted_faults import mirrored
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
+from beyond_mocap.synthetic.ground_truth.planted_markers import mirrored, planted
 
 SET = chosen_set("plug_in_gait")
 

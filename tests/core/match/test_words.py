@@ -26,8 +26,7 @@ from beyond_mocap.match.words import (
     write_words,
 )
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, Team
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
+from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
 
 
 def match_of(feed):
@@ -44,7 +43,7 @@ def match_of(feed):
 def planted():
     """A made match of 40 s, what was made of it, and the words."""
     truth = planted_match(40.0, seed=3)
-    match = match_of(sampled(truth, noise=0.03))
+    match = match_of(sample_feed(truth, noise=0.03))
     solved = solve_ball(match)
     return truth, match, solved, words_of(match, solved)
 

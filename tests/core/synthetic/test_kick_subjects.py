@@ -3,28 +3,28 @@
 import numpy as np
 
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
-from beyond_mocap.synthetic.kick_subjects import KickManner, kick_style, kicker, styled
 from beyond_mocap.synthetic.kicks import BEFORE, KICKS, contact, kicked
+from beyond_mocap.synthetic.subjects import KickManner, make_kicker, style_kick, vary_kick
 
 
 def test_the_same_seed_is_the_same_person():
-    one, same, other = kicker(3), kicker(3), kicker(4)
+    one, same, other = make_kicker(3), make_kicker(3), make_kicker(4)
     assert one.skeleton.same_bones(same.skeleton, 0.0) and one.manner == same.manner
     assert not one.skeleton.same_bones(other.skeleton) and one.manner != other.manner
 
 
 def test_the_unstyled_manner_at_full_effort_kicks_as_the_table_does():
     for base in KICKS.values():
-        style = styled(base, KickManner(), 1.0)
+        style = style_kick(base, KickManner(), 1.0)
         for name in ("leg", "pelvis", "spine", "left_arm", "strides"):
             assert np.allclose(np.array(getattr(style, name)), np.array(getattr(base, name)))
 
 
 def test_a_harder_kick_swings_further_back_and_faster():
-    who = kicker(1)
+    who = make_kicker(1)
     feet = []
     for speed in (13.0, 22.0):
-        style = kick_style(who, KICKS["instep"], speed, np.random.default_rng(1))
+        style = vary_kick(who, KICKS["instep"], speed, np.random.default_rng(1))
         feet.append(
             np.linalg.norm(contact(style, neutral_stance(who.skeleton), "right", [(0.0, 0.0)])[1][0], axis=1).max()
         )
@@ -32,7 +32,7 @@ def test_a_harder_kick_swings_further_back_and_faster():
 
 
 def test_the_contact_told_is_the_one_of_the_whole_kick():
-    neutral = neutral_stance(kicker(2).skeleton)
+    neutral = neutral_stance(make_kicker(2).skeleton)
     ends = contact(KICKS["instep"], neutral, "left", [(0.0, 0.0), (0.03, 4.0)])[0][1]
     motion = kicked(KICKS["instep"], neutral, "left", 0.03, 4.0, fps=480.0)
     from beyond_mocap.motion.humanoid import identify

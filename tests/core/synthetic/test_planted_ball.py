@@ -5,8 +5,7 @@ import pytest
 
 from benchmarks.touch_score import Reading, ReadTouch, scored
 from beyond_mocap.ball.tracked.solve import solve
-from beyond_mocap.synthetic.ground_truth.planted import planted_match
-from beyond_mocap.synthetic.ground_truth.planted_feed import sampled
+from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
 
 TIMES = np.arange(0.0, 60.0, 0.02)
 
@@ -43,7 +42,7 @@ def test_all_parts_and_both_teams_come_and_the_same_seed_plays_the_same(match):
 
 
 def test_the_feed_scatters_by_its_noise(match):
-    feed = sampled(match, noise=0.08, snaps=0.0)
+    feed = sample_feed(match, noise=0.08, snaps=0.0)
     off = feed.ball[:, :2] - match.ball_at(feed.times)[:, :2]
     assert off.std() == pytest.approx(0.08, rel=0.15)
     assert not feed.filled.any() and not feed.wrong.any()
@@ -51,13 +50,13 @@ def test_the_feed_scatters_by_its_noise(match):
 
 
 def test_ten_hertz_without_heights(match):
-    feed = sampled(match, fps=10.0, heights=False)
+    feed = sample_feed(match, fps=10.0, heights=False)
     assert len(feed.times) == 600
     assert np.isnan(feed.ball[:, 2]).all() and np.isfinite(feed.ball[:, :2]).all()
 
 
 def test_filled_stretches_are_straight_between_their_corners(match):
-    feed = sampled(match, filled=0.5)
+    feed = sample_feed(match, filled=0.5)
     assert 0.5 <= feed.filled.mean() < 0.65
     bend = np.linalg.norm(np.diff(feed.ball[:, :2], 2, axis=0), axis=1)
     inside = feed.filled[:-2] & feed.filled[2:]
@@ -67,7 +66,7 @@ def test_filled_stretches_are_straight_between_their_corners(match):
 
 @pytest.mark.parametrize("how", [{"filled": 0.3}, {"fps": 10.0, "heights": False}])
 def test_the_solver_finds_who_touched_it_when(match, how):
-    feed = sampled(match, **how)
+    feed = sample_feed(match, **how)
     solved = solve(feed.times, feed.ball, feed.positions, feed.ids, feed.teams, (feed.length, feed.width))
     read = tuple(ReadTouch(touch.time, (touch.player,)) for touch in match.touches if 1.2 < touch.time < 59.0)
     reading = Reading(((1.2, 59.0),), read, (ReadTouch(1.0),))

@@ -11,11 +11,8 @@ from beyond_mocap.motion.motion import forward_kinematics, pose_kinematics
 from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
 from beyond_mocap.synthetic.ground_truth.planted_body import in_marker_axes
-from beyond_mocap.synthetic.ground_truth.planted_error import planted_error
-from beyond_mocap.synthetic.ground_truth.planted_faults import mirrored
-from beyond_mocap.synthetic.ground_truth.planted_markers import planted
-from beyond_mocap.synthetic.ground_truth.planted_places import SETS
-from beyond_mocap.synthetic.ground_truth.planted_skin import markers_on
+from beyond_mocap.synthetic.ground_truth.planted_markers import mirrored, planted, planted_error
+from beyond_mocap.synthetic.ground_truth.planted_places import SETS, markers_on
 from beyond_mocap.synthetic.throws import throw
 
 

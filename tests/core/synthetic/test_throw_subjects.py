@@ -4,16 +4,16 @@ import numpy as np
 
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthetic.throw_subjects import Manner, styled, subject, subject_throws
+from beyond_mocap.synthetic.subjects import ThrowManner, make_throw, make_thrower, style_throw
 from beyond_mocap.synthetic.throws import STYLES
 
 
 def thrown(seed, speed=20.0, chance=5):
-    return subject_throws(subject(seed), (14.0, 0.0, 1.2), speed, np.random.default_rng(chance))
+    return make_throw(make_thrower(seed), (14.0, 0.0, 1.2), speed, np.random.default_rng(chance))
 
 
 def test_the_same_seed_is_the_same_person():
-    one, same, other = subject(3), subject(3), subject(4)
+    one, same, other = make_thrower(3), make_thrower(3), make_thrower(4)
     assert one.skeleton.same_bones(same.skeleton, 0.0) and one.manner == same.manner
     assert not one.skeleton.same_bones(other.skeleton) and one.manner != other.manner
     assert one.skeleton.names == other.skeleton.names
@@ -21,7 +21,7 @@ def test_the_same_seed_is_the_same_person():
 
 
 def test_both_sides_of_a_body_are_alike():
-    body = subject(2).skeleton
+    body = make_thrower(2).skeleton
     for joint, name in enumerate(body.names):
         if name.startswith("Left"):
             other = body.offsets[body.index("Right" + name[4:])]
@@ -29,7 +29,7 @@ def test_both_sides_of_a_body_are_alike():
 
 
 def test_the_unstyled_manner_at_full_effort_throws_as_the_table_does():
-    style = styled(STYLES["overarm"], Manner(), 1.0)
+    style = style_throw(STYLES["overarm"], ThrowManner(), 1.0)
     for name in ("pelvis", "right_arm", "forearm", "left_foot", "right_foot"):
         assert np.allclose(np.array(getattr(style, name)), np.array(getattr(STYLES["overarm"], name)))
 

@@ -11,8 +11,8 @@ from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.correction import Freedom, corrected
+from beyond_mocap.throws.led_limb import shifts_about
 from beyond_mocap.throws.letting_go import InHand, grip_point
-from beyond_mocap.throws.shift import shifts_about
 
 
 def impact(found, target):

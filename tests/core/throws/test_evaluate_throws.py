@@ -19,8 +19,7 @@ from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import example_of
 from beyond_mocap.throws.networks.generate import Generated
 from beyond_mocap.throws.networks.limits import learn
-from beyond_mocap.throws.report.page import throws_page
-from beyond_mocap.throws.report.strip import strip
+from beyond_mocap.throws.throws_page import draw_strip, throws_page
 
 
 class Model:
@@ -149,6 +148,6 @@ def test_a_page_leaves_out_what_nothing_was_measured_of(examples, monkeypatch):
 
 
 def test_all_dots_lie_on_their_axis():
-    made = strip([("one", "network", [(0.0, "a"), (7000.0, "b"), (2.9, "c")])], 3.0, "cm")
+    made = draw_strip([("one", "network", [(0.0, "a"), (7000.0, "b"), (2.9, "c")])], 3.0, "cm")
     across = [float(x) for x in re.findall(r'cx="([-0-9.]+)"', made)]
     assert across[0] == 210.0 and 210.0 < across[2] < across[1] <= 890.0

@@ -15,7 +15,8 @@ from beyond_mocap.throws.networks.description import places_at, scaled, windows
 from beyond_mocap.throws.networks.example import Example, describe, example_of, mirrored, poses
 from beyond_mocap.throws.networks.features import guides, network_input, phase_of, widths
 from beyond_mocap.throws.networks.model import ModelSettings
-from beyond_mocap.throws.networks.training_set import leg_reach, steps, training_set, with_mirrors
+from beyond_mocap.throws.networks.training_set import leg_reach, steps, with_mirrors
+from tests.core.linear_throws import training_set
 
 TARGET = np.array([12.0, 3.0, 1.2])
 KINDS, WRISTS, FRAMES = ("hierarchy", "single"), ("given", "inferred"), ("hip", "static")

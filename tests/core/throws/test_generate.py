@@ -20,7 +20,8 @@ from beyond_mocap.throws.networks.limb_reach import LimbReach, bent_limb, hinge_
 from beyond_mocap.throws.networks.limits import learn
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
-from beyond_mocap.throws.networks.training_set import leg_reach, training_set
+from beyond_mocap.throws.networks.training_set import leg_reach
+from tests.core.linear_throws import training_set
 
 PLAIN = Options(pose_iterations=0, ik=False, blend=False, limits=False)
 

@@ -8,8 +8,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.networks.chains import chains_of
 from beyond_mocap.throws.networks.example import example_of
-from beyond_mocap.throws.networks.features import guides, network_input, widths
-from beyond_mocap.throws.networks.hip_guide import GUIDES, carried
+from beyond_mocap.throws.networks.features import HIP_GUIDES, carry_hips, guides, network_input, widths
 from beyond_mocap.throws.networks.kinematics import six
 from beyond_mocap.throws.networks.model import ModelSettings
 from beyond_mocap.throws.networks.training_set import steps
@@ -30,7 +29,7 @@ def test_a_body_that_turns_and_goes_as_one_takes_its_hips_along(told, angle):
     turn, shift = quaternion.to_matrix(quaternion.about_up(np.array(angle))), np.array([0.4, -0.2, 0.05])
     there = window._replace(next=pose.positions[:, list(chains.effectors)] @ turn.T + shift)
     origin = pose.positions[:, chains.hips] * (1.0, 1.0, 0.0)
-    found = carried(chains, pose, there, origin)
+    found = carry_hips(chains, pose, there, origin)
     assert np.abs(found[:, :3] + origin - (pose.positions[:, chains.hips] @ turn.T + shift)).max() < 1e-9
     assert np.abs(found[:, 3:] - six(turn @ pose.turns[:, chains.hips])).max() < 1e-6
 
@@ -38,8 +37,8 @@ def test_a_body_that_turns_and_goes_as_one_takes_its_hips_along(told, angle):
 def test_feet_count_more_than_hands(told):
     chains, pose, _, window = told
     still = pose.positions[:, list(chains.effectors)]
-    moved = [np.linalg.norm((carried(chains, pose, window._replace(next=still + push), 0.0)
-                             - carried(chains, pose, window._replace(next=still), 0.0))[:, :3], axis=-1).mean()
+    moved = [np.linalg.norm((carry_hips(chains, pose, window._replace(next=still + push), 0.0)
+                             - carry_hips(chains, pose, window._replace(next=still), 0.0))[:, :3], axis=-1).mean()
              for push in np.eye(4)[[0, 2]][:, :, None] * (0.0, 0.0, 0.1)]  # fmt: skip
     assert moved[1] == pytest.approx(3.0 * moved[0]) and moved[0] > 0.01
 
@@ -48,8 +47,8 @@ def test_the_hip_network_is_told_it_last(told):
     chains, pose, after, window = told
     plain, more = ModelSettings(), ModelSettings(carried=True)
     short, long = (network_input("hip", chains, one, pose, after, window) for one in (plain, more))
-    assert widths(chains, more)["hip"][0] == widths(chains, plain)["hip"][0] + GUIDES
-    assert np.array_equal(long[:, :-GUIDES], short) and guides("hip", chains, more) == GUIDES
+    assert widths(chains, more)["hip"][0] == widths(chains, plain)["hip"][0] + HIP_GUIDES
+    assert np.array_equal(long[:, :-HIP_GUIDES], short) and guides("hip", chains, more) == HIP_GUIDES
     assert guides("hip", chains, plain) == 0 and guides("body", chains, more) == 0
     level = pose.positions[:, chains.hips] * (1.0, 1.0, 0.0)
-    assert np.array_equal(long[:, -GUIDES:], carried(chains, pose, window, level))
+    assert np.array_equal(long[:, -HIP_GUIDES:], carry_hips(chains, pose, window, level))

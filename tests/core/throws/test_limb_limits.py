@@ -11,8 +11,7 @@ from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import Motion
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.networks.limb_limits import LimbLimits
-from beyond_mocap.throws.networks.limits import JointLimits, learn
+from beyond_mocap.throws.networks.limits import JointLimits, LimbLimits, learn
 
 SKELETON = adult_skeleton()
 BODY = identify(SKELETON)

@@ -11,8 +11,8 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.throws.made_kicks import kick
-from beyond_mocap.throws.struck import struck
+from beyond_mocap.throws.letting_go import strike_ball
+from beyond_mocap.throws.planted_examples import kick
 
 ASKED = [
     ("right", "instep", (11.0, 0.0, 1.0), 25.0), ("left", "inside", (11.0, 2.0, 0.5), 18.0),
@@ -46,7 +46,7 @@ def test_the_foot_meets_the_ball_and_gives_it_this_launch(made):
     frame = kicked.contact * kicked.motion.fps
     low, share = int(frame), frame - int(frame)
     now = [(1.0 - share) * rows[low] + share * rows[low + 1] for rows in (ends, velocities)]
-    given = struck(now[0][None], now[1][None], radius, kicked.ball[None], FOOTBALL)
+    given = strike_ball(now[0][None], now[1][None], radius, kicked.ball[None], FOOTBALL)
     assert abs(given.gap[0]) < 0.01
     assert np.linalg.norm(given.velocity[0] - kicked.velocity) < 0.06 * speed
 
@@ -56,7 +56,7 @@ def test_the_foot_comes_from_behind_the_ball(made):
     ends, _, radius = foot_line(kicked.motion, kicked.foot)
     before = slice(0, int((kicked.contact - 0.008) * kicked.motion.fps))
     nothing = np.zeros_like(ends[before])
-    gaps = struck(ends[before], nothing, radius, np.broadcast_to(kicked.ball, (len(nothing), 3)), FOOTBALL).gap
+    gaps = strike_ball(ends[before], nothing, radius, np.broadcast_to(kicked.ball, (len(nothing), 3)), FOOTBALL).gap
     assert gaps.min() > -0.005
 
 

@@ -5,8 +5,8 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.throws.networks import network as networks
-from beyond_mocap.throws.networks import phase_function
 from beyond_mocap.throws.networks.network import PhaseNetwork
+from beyond_mocap.throws.networks.phases import weigh_points
 
 
 def made(points=4, sizes=(7, 5, 6, 3), dtype=float, seed=0):
@@ -23,7 +23,7 @@ def made(points=4, sizes=(7, 5, 6, 3), dtype=float, seed=0):
 
 def written_out(network, x, phase):
     """eq. 3.20-3.24 with blended weights, one row."""
-    theta = phase_function.weights(phase, network.points)
+    theta = weigh_points(phase, network.points)
     a = (x - network.input_mean) / network.input_scale
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases)):
         a = np.einsum("k,koi->oi", theta, weight) @ a + theta @ bias
@@ -49,7 +49,7 @@ def test_one_control_point_ignores_the_phase():
 def test_single_frames_answer_as_the_whole_batch_does(points):
     network, random = made(points, dtype=np.float32), np.random.default_rng(2)
     x, phase = random.normal(size=(20, 7)), random.uniform(size=20)
-    thetas = phase_function.weights(phase, points)
+    thetas = weigh_points(phase, points)
     got = np.array([network.frame(row, theta) for row, theta in zip(x, thetas)])
     expected = network.predict(x, phase)
     assert np.abs(got - expected).max() < 1e-5 * np.abs(expected).max()
@@ -57,7 +57,7 @@ def test_single_frames_answer_as_the_whole_batch_does(points):
 
 def test_masks_multiply_what_a_layer_is_given():
     network, x = made(), np.ones((2, 7))
-    theta = phase_function.weights(np.array([0.2, 0.9]))
+    theta = weigh_points(np.array([0.2, 0.9]))
     nothing = [np.zeros((2, w.shape[2])) for w in network.weights]
     got = networks.forward(network.weights, network.biases, x, theta, keep=nothing)
     np.testing.assert_allclose(got, theta @ network.biases[-1])

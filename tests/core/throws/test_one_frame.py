@@ -13,11 +13,12 @@ from beyond_mocap.throws.networks.chains import HIERARCHY, chains_of
 from beyond_mocap.throws.networks.description import Windows, windows
 from beyond_mocap.throws.networks.example import describe, example_of, poses
 from beyond_mocap.throws.networks.features import network_input, phase_of, widths
+from beyond_mocap.throws.networks.frame_step import OneFrame
 from beyond_mocap.throws.networks.kinematics import Pose, matrices, one_pose, places_and_turns
 from beyond_mocap.throws.networks.model import ModelSettings, ThrowModel
 from beyond_mocap.throws.networks.network import PhaseNetwork
-from beyond_mocap.throws.networks.one_frame import OneFrame
-from beyond_mocap.throws.networks.training_set import leg_reach, training_set
+from beyond_mocap.throws.networks.training_set import leg_reach
+from tests.core.linear_throws import training_set
 
 
 def thrown():

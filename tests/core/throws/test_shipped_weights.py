@@ -7,15 +7,17 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.synthetic.throw_subjects import subject
+from beyond_mocap.synthetic.subjects import make_thrower
+from beyond_mocap.throws.evaluate_throws import deviations
+from beyond_mocap.throws.network_npz import WEIGHTS, shipped_model
 from beyond_mocap.throws.networks.description import scaled
 from beyond_mocap.throws.networks.example import describe, example_of
 from beyond_mocap.throws.networks.generate import Options, generate
 from beyond_mocap.throws.networks.kinematics import matrices
 from beyond_mocap.throws.networks.limits import JointLimits
 from beyond_mocap.throws.planted_examples import planted
-from beyond_mocap.throws.report.deviation import deviations
-from beyond_mocap.throws.throw import WEIGHTS, Order, shipped_model, throw_at
+from beyond_mocap.throws.throw import throw_at
+from beyond_mocap.throws.throw_order import Order
 
 ACTIONS = ("throw", "kick")
 TARGETS = {"throw": ((8.0, 0.0, 1.0), (15.0, 4.0, 1.5)), "kick": ((11.0, 0.0, 1.0), (20.0, -3.0, 1.8))}
@@ -87,7 +89,7 @@ def test_joints_of_a_generated_kick_are_within_limits():
 
 
 def test_limits_of_other_bones_are_judged():
-    thrown = throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5)), subject(5).skeleton)
+    thrown = throw_at(shipped_model("throw"), Order((15.0, 4.0, 1.5)), make_thrower(5).skeleton)
     assert thrown.beyond < 1e-6
 
 

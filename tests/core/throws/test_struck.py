@@ -11,14 +11,13 @@ from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.gestures import strike
 from beyond_mocap.throws.correction import Freedom, corrected
-from beyond_mocap.throws.letting_go import AtFoot, leaving
-from beyond_mocap.throws.struck import RATIO, struck
+from beyond_mocap.throws.letting_go import RATIO, AtFoot, leaving, strike_ball
 
 R = FOOTBALL.radius
 
 
 def one(ends, velocity, centre):
-    found = struck(np.array([ends], float), np.array([[velocity, velocity]], float), FOOT_RADIUS,
+    found = strike_ball(np.array([ends], float), np.array([[velocity, velocity]], float), FOOT_RADIUS,
                    np.array([centre], float), FOOTBALL)  # fmt: skip
     return found.velocity[0], found.spin[0], found.gap[0]
 

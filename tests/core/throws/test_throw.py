@@ -17,7 +17,8 @@ from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.throws.join_throw import join_throw, stand_still
 from beyond_mocap.throws.letting_go import InHand, grip_point
 from beyond_mocap.throws.network_npz import write_model
-from beyond_mocap.throws.throw import Order, throw_at, within
+from beyond_mocap.throws.throw import throw_at
+from beyond_mocap.throws.throw_order import Order, within
 from tests.core.linear_throws import linear_model, planted_examples, planted_kicks
 
 

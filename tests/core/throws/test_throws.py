@@ -8,8 +8,7 @@ from beyond_mocap.ball.physics import BASEBALL, PAPER
 from beyond_mocap.evaluation.paired_tests import judged, kept
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.report.deviation import deviations
-from beyond_mocap.throws.report.impact import impact, let_go
+from beyond_mocap.throws.evaluate_throws import deviations, find_impact, let_go
 
 # Fredriksson's tables 8.1, 8.2, 8.5, 8.6 (m: left arm, right arm, left leg, right leg, impact; a row for each subject)
 SINGLE = np.array([
@@ -123,17 +122,17 @@ def test_floating_hands_carry_the_ball_along():
 
 def test_impact_is_where_the_plane_is_crossed_or_the_ground_met():
     vacuum = type(PAPER)("vacuum", 0.04, 0.1)
-    found = impact((0.0, 0.0, 2.0), (20.0, 0.0, 1.0), (4.0, 0.0, 1.0), vacuum)
+    found = find_impact((0.0, 0.0, 2.0), (20.0, 0.0, 1.0), (4.0, 0.0, 1.0), vacuum)
     assert found == pytest.approx([4.0, 0.0, 2.0 + 0.2 - 0.5 * 9.8 * 0.04], abs=2e-4)
     fall = np.sqrt(2.0 * 1.96 / 9.8)
-    found = impact((0.0, 0.0, 2.0), (2.0, 0.5, 0.0), (4.0, 0.0, 1.0), vacuum)
+    found = find_impact((0.0, 0.0, 2.0), (2.0, 0.5, 0.0), (4.0, 0.0, 1.0), vacuum)
     assert found == pytest.approx([2.0 * fall, 0.5 * fall, 0.04], abs=2e-4)
-    found = impact((1.0, 1.0, 1.8), (0.0, 15.0, 2.0), (1.0, 5.0, 9.0), vacuum)
+    found = find_impact((1.0, 1.0, 1.8), (0.0, 15.0, 2.0), (1.0, 5.0, 9.0), vacuum)
     assert found == pytest.approx([1.0, 5.0, 1.8 + 2.0 * 4 / 15 - 4.9 * (4 / 15) ** 2], abs=2e-4)
 
 
 def test_a_made_throw_hits_what_it_was_aimed_at():
     made = throw((4.0, 0.3, 1.2), 16.0, fps=60.0)
     vacuum = type(BASEBALL)("vacuum", 0.0366, 0.145, 9.81)
-    found = impact(*let_go(made.motion, *hand_and_grip(made), made.release * 60.0), (4.0, 0.3, 1.2), vacuum)
+    found = find_impact(*let_go(made.motion, *hand_and_grip(made), made.release * 60.0), (4.0, 0.3, 1.2), vacuum)
     assert np.linalg.norm(found - (4.0, 0.3, 1.2)) < 0.05

@@ -7,7 +7,7 @@ from beyond_mocap.motion import quaternion, reach
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import throw
-from beyond_mocap.throws.networks.correct import bend_to, toward
+from beyond_mocap.throws.networks.limb_reach import bend_to, toward
 
 MOTION = throw(fps=60.0).motion
 BODY = identify(MOTION.skeleton)

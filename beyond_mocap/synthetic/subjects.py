@@ -1,0 +1,238 @@
+"""Synthetic people who throw or kick: each has a body, a fastest throw or kick and a manner of their own.
+
+They do the same thing alike, but not the same twice: harder throws are wound up further (longer stride, more turn of
+pelvis and chest, arm turned out further), and a little chance is in all of it. So what a network learns on one subject,
+and what it is asked for another, are known truths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from ..motion.retargeting.adult import STATURE, adult_skeleton
+from ..motion.skeleton import Skeleton
+from .kicks import KickStyle
+from .throws import STYLES, Throw, ThrowStyle, throw
+
+_KICK_SCATTER = {"approach": 2.0, "stride": 0.04, "back": 0.04, "follow": 0.05, "lean": 1.5, "off_arm": 0.06}
+"""Standard deviation of the chance from kick to kick."""
+_WHIP = 0.05  # s around the contact in which the leg goes through the ball
+_LEAST_KICK = 8.0  # m/s of the ball, the slowest kick that is swung at all
+
+_THROW_SCATTER = {
+    "slot": 2.0, "stride": 0.04, "lift": 0.08, "wind_up": 0.04, "lean": 0.06, "off_arm": 0.06, "follow": 0.05,
+}  # fmt: skip
+"""Standard deviation of the chance from throw to throw."""
+_LEAST_THROW = 9.0  # m/s, the slowest throw that is wound up at all
+
+
+@dataclass(frozen=True, eq=False)
+class Person:
+    """stature: metres. side: "left" or "right", the hand that throws or the foot that kicks; made people use the right
+    one. fastest: m/s that the ball gets at most. manner: how this person does it."""
+
+    name: str
+    stature: float
+    skeleton: Skeleton
+    side: str
+    fastest: float
+    manner: object
+
+
+def make_adult(fastest: float, manner) -> Person:
+    """The project's own adult, in the manner of the tables."""
+    return Person("adult", STATURE, adult_skeleton(), side="right", fastest=fastest, manner=manner)
+
+
+def make_person(
+    name: str, manner: type, ranges: Mapping[str, tuple[float, float]], fastest: tuple[float, float],
+    chance: np.random.Generator,
+) -> Person:
+    """Somebody of 1.6 to 2.0 m by chance. ranges: lowest and highest of each field of the manner. fastest: the same of
+    the ball, m/s."""
+    stature = float(chance.uniform(1.60, 2.00))
+    own = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
+    hardest = float(chance.uniform(*fastest))
+    return Person(name, stature, make_body(stature, chance), side="right", fastest=hardest, manner=own)
+
+
+def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
+    """An adult of `stature` metres whose limbs and trunk are some percent longer or shorter than usual, both sides
+    alike."""
+    usual = adult_skeleton(stature)
+    legs, arms, wide = chance.uniform([0.965, 0.95, 0.94], [1.035, 1.05, 1.06])
+    trunk = 1.0 - 0.9 * (legs - 1.0)  # long legs make a short trunk
+    offsets = np.array(usual.offsets)
+    for joint, name in enumerate(usual.names):
+        part = name.removeprefix("Left").removeprefix("Right")
+        if part in ("Leg", "Foot"):
+            offsets[joint] *= legs
+        elif part in ("ForeArm", "Hand"):
+            offsets[joint] *= arms
+        elif part in ("Shoulder", "Arm", "UpLeg"):
+            offsets[joint, 1] *= wide
+        elif part.startswith("Spine") or part == "Neck":
+            offsets[joint] *= trunk
+    return replace(usual, offsets=offsets)
+
+
+def scatter_manner(manner, scatter: dict[str, float], chance: np.random.Generator):
+    """The same manner a little otherwise, by normal chance of the standard deviations `scatter` up to twice as far."""
+    off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
+    return replace(
+        manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)}
+    )
+
+
+def scale_rows(rows: tuple, *factors: float) -> tuple:
+    """Rows (time, values...) with every value times its factor."""
+    return tuple((row[0], *(value * factor for value, factor in zip(row[1:], factors))) for row in rows)
+
+
+@dataclass(frozen=True, kw_only=True)
+class KickManner:
+    """How somebody kicks: approach, degrees that the way up is turned more than usual; factors on stride, back (how far
+    leg and pelvis are swung back) and follow (how high the leg goes after the ball); lean, degrees that the trunk is
+    inclined more to the standing leg; off_arm, a factor on how far the arms are held out."""
+
+    approach: float = 0.0
+    stride: float = 1.0
+    back: float = 1.0
+    follow: float = 1.0
+    lean: float = 0.0
+    off_arm: float = 1.0
+
+
+_KICK_RANGES = {
+    "approach": (-9.0, 8.0), "stride": (0.86, 1.08), "back": (0.86, 1.04), "follow": (0.75, 1.15), "lean": (-5.0, 5.0),
+    "off_arm": (0.75, 1.08),
+}  # fmt: skip
+"""Between which people differ."""
+
+
+def make_kicker(seed: int) -> Person:
+    """Somebody who kicks; the same seed gives the same person. Seed 0 is the project's own adult."""
+    if seed == 0:
+        return make_adult(28.0, KickManner())
+    return make_person(f"kicker{seed:02d}", KickManner, _KICK_RANGES, (22.0, 28.0), np.random.default_rng([seed, 1863]))
+
+
+def vary_kick(who: Person, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
+    """How this person kicks a ball of `speed` m/s in the style `base`; `chance` makes it differ from the one before."""
+    effort = float(np.clip((speed - _LEAST_KICK) / (who.fastest - _LEAST_KICK), 0.0, 1.0))
+    return style_kick(base, scatter_manner(who.manner, _KICK_SCATTER, chance), effort)
+
+
+def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> KickStyle:
+    """`base` kicked in somebody's manner with `effort` 0..1 of a hard kick's swing."""
+    back, follow = manner.back * (0.78 + 0.22 * effort), manner.follow * (0.66 + 0.34 * effort)
+    out, turn = manner.off_arm * (0.7 + 0.3 * effort), 0.75 + 0.25 * effort * manner.back
+    approach = base.approach + manner.approach
+    arms = [scale_rows(rows, out, out, 1.0, 1.0) for rows in (base.left_arm, base.right_arm)]
+    return replace(
+        base, approach=approach,
+        strides=tuple(manner.stride * (0.8 + 0.2 * effort) * stride for stride in base.strides),
+        leg=_swung(base.leg, back, 0.72 + 0.28 * effort, follow),
+        pelvis=tuple((t, side, tilt, _turned(t, about, turn, manner.approach)) for t, side, tilt, about in base.pelvis),
+        spine=tuple((t, side - manner.lean * _near_zero(t), tilt, turn * about) for t, side, tilt, about in base.spine),
+        left_arm=arms[0], right_arm=arms[1],
+    )
+
+
+def _swung(rows: tuple, back: float, whip: float, follow: float) -> tuple:
+    """Rows (time, thigh, knee) of the leg: so much of the swing back, of the whip through the ball, of the way up."""
+    at = next(row for row in rows if row[0] == 0.0)
+    out = []
+    for time, thigh, knee in rows:
+        if time < -_WHIP:
+            out.append((time, back * thigh, back * knee))
+        elif time > _WHIP:
+            out.append((time, follow * thigh, knee))
+        else:
+            out.append((time, at[1] + whip * (thigh - at[1]), at[2] + whip * (knee - at[2])))
+    return tuple(out)
+
+
+def _turned(time: float, about: float, turn: float, approach: float) -> float:
+    """The pelvis's turn: on the way up the approach's, from then on so much of the style's."""
+    way_up = float(np.clip((-0.2 - time) / 0.2, 0.0, 1.0))
+    return about * (way_up + (1.0 - way_up) * turn) - way_up * approach
+
+
+def _near_zero(time: float) -> float:
+    return float(np.exp(-0.5 * (time / 0.25) ** 2))
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThrowManner:
+    """How somebody throws: slot, degrees that the trunk leans away from the arm at release, more than usual; factors on
+    stride, lift (of the leading leg), wind_up (seconds before the foot is down), lean (forward, after release), off_arm
+    (how far the other arm is held out) and follow (seconds after release)."""
+
+    slot: float = 0.0
+    stride: float = 1.0
+    lift: float = 1.0
+    wind_up: float = 1.0
+    lean: float = 1.0
+    off_arm: float = 1.0
+    follow: float = 1.0
+
+
+_THROW_RANGES = {
+    "slot": (-7.0, 7.0), "stride": (0.85, 1.10), "lift": (0.45, 1.15), "wind_up": (0.80, 1.15), "lean": (0.75, 1.15),
+    "off_arm": (0.80, 1.10), "follow": (0.90, 1.15),
+}  # fmt: skip
+"""Between which people differ."""
+
+
+def make_thrower(seed: int) -> Person:
+    """Somebody who throws; the same seed gives the same person. Seed 0 is the project's own adult."""
+    if seed == 0:
+        return make_adult(34.0, ThrowManner())
+    chance = np.random.default_rng([seed, 1907])
+    return make_person(f"subject{seed:02d}", ThrowManner, _THROW_RANGES, (24.0, 34.0), chance)
+
+
+def make_throw(
+    thrower: Person, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
+) -> Throw:
+    """A throw of this subject at `target` (3,) m with `speed` m/s; `chance` makes it differ from the one before.
+
+    InputError as for `throws.throw`.
+    """
+    manner = scatter_manner(thrower.manner, _THROW_SCATTER, chance)
+    effort = float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
+    style = style_throw(STYLES["overarm"], manner, effort)
+    return throw(target, speed, thrower.side, style=style, skeleton=thrower.skeleton, fps=fps)
+
+
+def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> ThrowStyle:
+    """`base` thrown in somebody's manner with `effort` 0..1 of a hard throw's winding up."""
+    turn, out = 0.62 + 0.38 * effort, 0.78 + 0.22 * effort
+    way = manner.stride * (0.62 + 0.38 * effort)
+    raised = manner.lift * (0.25 + 0.75 * effort)
+    lean = manner.lean * (0.55 + 0.45 * effort)
+    spine = [(t, side - manner.slot * _near_zero(t), lean * tilt, turn * about) for t, side, tilt, about in base.spine]
+    style = ThrowStyle(
+        pelvis=scale_rows(base.pelvis, 1.0, lean, turn), spine=tuple(spine),
+        right_arm=tuple((t, a, b, c if c > -60.0 else -60.0 + out * (c + 60.0), e) for t, a, b, c, e in base.right_arm),
+        left_arm=scale_rows(base.left_arm, manner.off_arm, manner.off_arm, 1.0, 1.0), forearm=base.forearm,
+        hips=scale_rows(base.hips, way, 0.4 + 0.6 * way),
+        left_foot=scale_rows(base.left_foot, way, 1.0, raised, raised, turn),
+        right_foot=scale_rows(base.right_foot, way, 1.0, 1.0, 1.0, turn),
+    )
+    brisk = replace(manner, wind_up=manner.wind_up * (0.6 + 0.4 * effort), follow=manner.follow * (0.7 + 0.3 * effort))
+    return ThrowStyle(*(_paced(getattr(style, field.name), brisk) for field in fields(style)))
+
+
+def _paced(rows: tuple, manner: ThrowManner) -> tuple:
+    """The wind-up (before 0.35 s to release) and the follow-through (after 0.2 s) slower or faster."""
+
+    def later(time: float) -> float:
+        time = time if time > -0.35 else -0.35 + manner.wind_up * (time + 0.35)
+        return time if time < 0.2 else 0.2 + manner.follow * (time - 0.2)
+
+    return tuple((later(row[0]), *row[1:]) for row in rows)

@@ -1,0 +1,168 @@
+"""What was written down about recorded throws and kicks: in annotations, in `throws.csv`, by the command `release`."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..annotation import ClipAnnotation
+from ..annotation.labels import list_labels
+from ..ball.physics import BASEBALL, FOOTBALL, Ball
+from ..base.errors import InputError
+from ..files.content import content
+from ..files.tables import number, read_rows
+from ..library.scan import Annotations
+from .networks.chains import EFFECTORS as LIMBS
+
+TABLE_NAME = "throws.csv"
+TARGET = ("target_x_m", "target_y_m", "target_z_m")
+LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
+_SAME_MOMENT = 0.5  # s between key moments that are of one throw
+_FASTEST = 100.0  # m/s, no ball leaves a hand or a foot faster
+
+
+@dataclass(frozen=True, kw_only=True)
+class Action:
+    """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are
+    wanted at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
+
+    words: frozenset[str]
+    limbs: tuple[int, int]
+    before: tuple[float, float]
+    after: tuple[float, float]
+    wall: float
+    ball: Ball
+
+
+ACTIONS = {
+    "throw": Action(words=frozenset(list_labels(action="throw")), limbs=(0, 1), before=(1.6, 3.0), after=(1.2, 2.0),
+                    wall=4.0, ball=BASEBALL),
+    "kick": Action(words=frozenset(list_labels(action="kick")), limbs=(2, 3), before=(1.2, 3.0), after=(0.8, 2.0),
+                   wall=11.0, ball=FOOTBALL),
+}
+"""The walls: Fredriksson's stood about 4 m away (§8.2); a penalty is shot from 11 m."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class KnownThrow:
+    """What was written about one throw; None is unknown. stretch, release: s. target, launch: (3,). speed m/s."""
+
+    stretch: tuple[float, float] | None = None
+    release: float | None = None
+    limb: int | None = None
+    target: np.ndarray | None = None
+    launch: np.ndarray | None = None
+    speed: float | None = None
+    subject: str | None = None
+
+
+def is_known(path: Path, action: Action, words: Annotations, rows: list[KnownThrow] | None) -> bool:
+    """Whether anybody wrote down that a recording has such an action."""
+    return bool(rows) or any(_annotated(words, path, 120.0, action)) or _report_of(path).is_file()
+
+
+def read_known(
+    path: Path, fps: float, action: Action, words: Annotations, rows: list[KnownThrow] | None
+) -> list[KnownThrow]:
+    """What is known of each throw in a recording: the table first, then the report beside it, then its annotations."""
+    annotated = list(_annotated(words, path, fps, action))
+    measured = _measured(_report_of(path), action)
+    if not rows:
+        return [_filled(measured, _near(annotated, measured.release))] if measured else annotated
+    return [_filled(_filled(row, measured), _near(annotated, row.release)) for row in rows]
+
+
+def _near(annotated: list[KnownThrow], release: float | None) -> KnownThrow | None:
+    """The annotation of a release, the first where its time is not known."""
+    if release is None:
+        return annotated[0] if annotated else None
+    close = [known for known in annotated if abs(known.release - release) < _SAME_MOMENT]
+    return min(close, key=lambda known: abs(known.release - release), default=None)
+
+
+def _filled(known: KnownThrow, other: KnownThrow | None) -> KnownThrow:
+    """`known`, with what only `other` knows."""
+    if other is None:
+        return known
+    unknown = {name: getattr(other, name) for name, value in vars(known).items() if value is None}
+    return replace(known, **unknown)
+
+
+def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> Iterator[KnownThrow]:
+    """The throws that annotations tell, each key moment once, in their order in time."""
+    last = -np.inf
+    rows: list[ClipAnnotation] = [row for row in words.of(path, fps) if action.words & set(row.words)]
+    for row in sorted((row for row in rows if row.key is not None), key=lambda row: row.key):
+        release = row.key / fps
+        if release - last < _SAME_MOMENT:
+            continue
+        last = release
+        sides = [side for side, word in enumerate(("left", "right")) if word in row.words]
+        yield KnownThrow(stretch=(row.start / fps, row.end / fps), release=release,
+                         limb=action.limbs[sides[0]] if len(sides) == 1 else None)
+
+
+def read_table(folder: Path, action: Action, names: set[str]) -> dict[str, list[KnownThrow]]:
+    """Rows of `throws.csv` in `folder` by file, one of the recordings' `names`; those of other limbs than the action's
+    left out. Nothing where there is none."""
+    path, out = folder / TABLE_NAME, {}
+    if not path.is_file():
+        return out
+    for where, row in read_rows(path, ("file",)):
+        known = _row(row, where)
+        file = Path(row["file"]).as_posix()
+        if file not in names:
+            raise InputError(where, f"no file {row['file'][:80]!r}", "a BVH file below this table, as seen from it")
+        if known.limb is None or known.limb in action.limbs:
+            out.setdefault(file, []).append(known)
+    return out
+
+
+def _row(row: dict[str, str], where: str) -> KnownThrow:
+    def value(name: str) -> float | None:
+        return number(row[name], name, where) if (row.get(name) or "").strip() else None
+
+    def vector(names: tuple[str, ...]) -> np.ndarray | None:
+        values = [value(name) for name in names]
+        if any(v is None for v in values) and any(v is not None for v in values):
+            raise InputError(where, f"only some of {', '.join(names)}", "all three or none")
+        return None if values[0] is None else np.array(values)
+
+    limb = (row.get("limb") or "").strip().lower()
+    if limb and limb not in LIMBS:
+        raise InputError(where, f"limb {limb!r}"[:80], f"one of {', '.join(LIMBS)}")
+    launch, speed = vector(LAUNCH), value("speed_m_s")
+    for name, fast in (("speed_m_s", speed), ("launch", None if launch is None else float(np.linalg.norm(launch)))):
+        if fast is not None and not 0.0 < fast <= _FASTEST:
+            expected = f"more than 0, at most {_FASTEST:g} m/s"
+            raise InputError(where, f"{name} {fast:g} m/s", expected, "correct the cell or leave it empty")
+    return KnownThrow(release=value("release_s"), limb=LIMBS.index(limb) if limb else None, target=vector(TARGET),
+                      launch=launch, speed=speed, subject=(row.get("subject") or "").strip() or None)
+
+
+def _report_of(path: Path) -> Path:
+    return path.with_suffix(".release.json")
+
+
+def _measured(path: Path, action: Action) -> KnownThrow | None:
+    """What the report of `release` says about a throw; None where there is none."""
+    if not path.is_file() or action.ball is not BASEBALL:
+        return None
+    try:
+        report = json.loads(content(path, "a report of 'release'").decode("utf-8"))
+        speed = float(report["speed_m_s"])
+        launch = speed * np.asarray(report["direction"], float)
+        limb = LIMBS.index(f"{report['hand']}_hand")
+        release = float(report["release_time_s"])
+        impact = report.get("impact_m")
+        impact = np.array(impact, float) if isinstance(impact, list) and len(impact) == 3 else None
+        known = [*launch, release] if impact is None else [*launch, release, *impact]
+        if not (launch.shape == (3,) and np.isfinite(known).all() and np.linalg.norm(launch) <= _FASTEST):
+            raise ValueError
+    except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
+        raise InputError(path, "no report of a release", "what the command 'release' writes") from None
+    return KnownThrow(release=release, limb=limb, target=impact, launch=launch, speed=speed)
