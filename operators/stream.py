@@ -9,7 +9,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.passes.stream.live_hits import recorded
 from ..scene.passes import make
 from ..scene.passes.settings import subject
-from ..scene.stream import follow, play, receiver, streamed
+from ..scene.stream import follow, play
 from .verb import BackgroundVerb, Verb
 
 
@@ -25,11 +25,11 @@ Nothing from other machines gets in, and nothing is sent"""
     def poll(cls, context):
         """One stream at a time."""
         cls.poll_message_set("A stream is listened to already: press Stop Stream first")
-        return receiver.listener() is None
+        return follow.current_listener() is None
 
     def do(self, context):
         """Bind the port and begin to listen."""
-        receiver.start(context.scene.beyond_mocap_stream)
+        follow.start_listening(context.scene.beyond_mocap_stream)
         follow.began()
 
 
@@ -40,7 +40,7 @@ class ListeningVerb(Verb):
     def poll(cls, context):
         """The stream that is received."""
         cls.poll_message_set("No stream is listened to: press Start Stream first")
-        return receiver.listener() is not None
+        return follow.current_listener() is not None
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -52,7 +52,7 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Close."""
-        receiver.stop()
+        follow.stop_listening()
         follow.tell()
 
 
@@ -92,10 +92,10 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Read the ring, write an action."""
-        motion = recorded(receiver.listener(), self.seconds)
+        motion = recorded(follow.current_listener(), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
-        streamed.keep(context, motion)
+        follow.keep_recording(context, motion)
 
 
 class BEYOND_MOCAP_OT_stream_play(BackgroundVerb, bpy.types.Operator):

@@ -8,7 +8,7 @@ import bmesh
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from . import lines
+from . import nodes
 from .settings import is_cloud
 
 if TYPE_CHECKING:
@@ -87,11 +87,11 @@ def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
     kept, rows = cloud.beyond_mocap_cloud, _rows_of(marker_set)
     trial = read(cloud, bpy.context.scene)
     names = dict(zip(trial.labels, named_as(trial, marker_set).labels))
-    with lines.at_once():
+    with nodes.draw_later():
         for row in kept.labels:
             row.name = names.get(row.name, row.name)
             row.segment, row.landmark, row.role = rows.get(row.name, ("", "", "NEEDED"))
-    lines.draw(cloud)
+    nodes.draw_lines(cloud)
     kept.set_name, kept.set_text = marker_set.name, marker_set_text(marker_set)
     there = {row.name for row in kept.labels}
     missing = sorted(marker_set.needed - there)
@@ -121,14 +121,14 @@ def assign(cloud: bpy.types.Object, names: list[str], segment: str) -> None:
 
     if segment and segment not in JOINTS:
         raise InputError("segment", f"{segment!r}", f"one of {', '.join(JOINTS)}")
-    with lines.at_once():
+    with nodes.draw_later():
         for row in cloud.beyond_mocap_cloud.labels:
             if row.name in names:
                 row.segment = segment
                 if row.role in ("BALL", "OTHER") and segment:
                     row.role = "NEEDED"
     cloud.beyond_mocap_cloud.set_name = OWN
-    lines.draw(cloud)
+    nodes.draw_lines(cloud)
 
 
 def chosen(cloud: bpy.types.Object) -> list[str]:

@@ -26,9 +26,9 @@ ROLES = (
 
 def redraw(label, _context) -> None:
     """Draw lines and colours by the new segments."""
-    from . import lines
+    from . import nodes
 
-    lines.draw(label.id_data)
+    nodes.draw_lines(label.id_data)
 
 
 def shown(kept, _context) -> None:

@@ -234,7 +234,7 @@ def left_over(room):
     window, live = room("scene.core.window"), room("scene.core.live")
     found += [*map(str, (*window._drawn, *window._clocks, *live._timers, *room("scene.result.queue").names()))]
     found += [job.kind for job in room("scene.core.background")._newest.values() if not job.stale]
-    found += ["stream"] if room("scene.stream.receiver").listener() is not None else []
+    found += ["stream"] if room("scene.stream.follow").current_listener() is not None else []
     found += ["rally"] if room("scene.stream.play").rally() is not None else []
     return found + ["queue"] * room("scene.result.queue").worked()
 
@@ -277,7 +277,7 @@ def a_match_child(room, _context):
 
 
 def a_stream(room, _context):
-    room("scene.stream.receiver").start(bpy.context.scene.beyond_mocap_stream)
+    room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
     room("scene.stream.follow").began()
 
 

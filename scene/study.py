@@ -10,15 +10,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ...beyond_mocap.files.whole import beside, whole_folder
-from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.motion.track.ball_path import BallPath
-from ..core import action, channels
-from ..core.aside import scene_aside
-from ..core.material import colour
-from ..core.measure import frames_per_second, whole_frames
-from ..rigs import armature
-from ..stage import ball, body
+from ..beyond_mocap.files.whole import beside, whole_folder
+from ..beyond_mocap.motion.motion import Motion
+from ..beyond_mocap.motion.track.ball_path import BallPath
+from .core import action, channels
+from .core.aside import scene_aside
+from .core.material import colour
+from .core.measure import frames_per_second, whole_frames
+from .rigs import armature
+from .stage import ball, body
 
 SHIRT = (0.30, 0.32, 0.35)  # linear RGB, no team's
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
