@@ -1,4 +1,4 @@
-"""What an aimed ball keeps. Saved with the file, and known to undo."""
+"""What an aimed ball keeps, saved with the file and known to undo; which ball, body and target are meant."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from bpy.props import BoolProperty, FloatProperty, FloatVectorProperty, IntPrope
 
 from ..core import live
 from ..core.properties import with_settings
+from ..passes.settings import KEPT
 from ..result.result import BeyondMocapBefore
 
 MARK = "beyond_mocap_shot"
@@ -66,3 +67,30 @@ def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
     meant += [ball for ball in balls if ball.select_get()]
     meant += balls if len(balls) == 1 else []
     return meant[0] if meant else None
+
+
+def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The ball that is selected, by its mark or name; an aimed one that is active or whose target is; the only mesh
+    that is selected."""
+    chosen = [thing for thing in context.selected_objects if thing.type == "MESH"]
+    marked = [thing for thing in chosen if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
+    if marked:
+        return marked[0]
+    active = context.view_layer.objects.active
+    aimed = aimed_ball(context)
+    if aimed is not None and active in (aimed, aimed.beyond_mocap_aim.target, aimed.beyond_mocap_aim.body):
+        return aimed
+    loose = [thing for thing in chosen if thing.parent is None]
+    return loose[0] if len(loose) == 1 and len(context.selected_objects) == 1 else None
+
+
+def body_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+    """The armature that strikes: the active one, or one that is selected."""
+    active = context.view_layer.objects.active
+    found = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
+    return found[0] if found else None
+
+
+def target_meant(context: bpy.types.Context) -> bpy.types.Object | None:
+    """An Empty that is selected."""
+    return next((thing for thing in context.selected_objects if thing.type == "EMPTY"), None)

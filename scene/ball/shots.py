@@ -267,6 +267,21 @@ def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
     return float(x), float(y), FOOTBALL.radius
 
 
+def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
+    """Scene frames of the ball stretch of the strike nearest to the current frame; the current frame where there is
+    none."""
+    from ...beyond_mocap.passes.hits import analyse
+
+    motion, first = motion_of(scene, body)
+    now = min(max(scene.frame_current, first), first + len(motion) - 1)
+    motions = analyse(motion, part, side).motions
+    if not motions:
+        return now, now
+    nearest = min(motions, key=lambda one: abs(first + one.key - scene.frame_current))
+    low, high = nearest.ball_stretch
+    return int(first + low), int(first + high)
+
+
 def radius_of(wish: Wish) -> float:
     """Metres of the ball that a wish asks for."""
     from ...beyond_mocap.ball.physics import BALLS

@@ -12,7 +12,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.measure import frames_per_second, units_per_metre
-from ..passes import rally
+from ..passes import make
 from . import colours, shapes
 from .prepare import Mesh
 from .rides import Item
@@ -35,13 +35,13 @@ def items(scene: bpy.types.Scene) -> list[Item]:
     ]  # fmt: skip
 
 
-def seen(scene: bpy.types.Scene) -> rally.Rally | None:
+def seen(scene: bpy.types.Scene) -> make.Rally | None:
     """The rally of which anything is to be drawn."""
     view = scene.beyond_mocap.view
-    return rally.of(scene) if rally.anything() and view.show and view.shots else None
+    return make.rally_of(scene) if make.has_rallies() and view.show and view.shots else None
 
 
-def whole(shown: rally.Rally) -> list[Mesh]:
+def whole(shown: make.Rally) -> list[Mesh]:
     """All flights, strikes and bounces."""
     lines = np.concatenate([shapes.along(way) for way in shown.ways])
     found = [Mesh("LINES", lines, colours.repeated(colours.GREY, len(lines), 0.6), THIN)]
@@ -56,7 +56,7 @@ def whole(shown: rally.Rally) -> list[Mesh]:
     return found
 
 
-def flight(shown: rally.Rally, now: int) -> list[Mesh]:
+def flight(shown: make.Rally, now: int) -> list[Mesh]:
     """One flight, and those that its strike could have given."""
     line, found = shapes.along(shown.ways[now]), []
     strike = int(np.searchsorted(shown.strike_times, shown.starts[now] + 1e-6)) - 1

@@ -61,7 +61,7 @@ def take(
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
             raise InputError(
-                f"ball {ball.name}", f"carried by {_name(other)} on frames {other.first} to {other.last} already",
+                f"ball {ball.name}", f"carried by {holder_name(other)} on frames {other.first} to {other.last} already",
                 "other frames", "free the ball there first",
             )
     if not ball.beyond_mocap_ball.before.kept:
@@ -313,5 +313,6 @@ def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
     return np.array(found)
 
 
-def _name(hold) -> str:
+def holder_name(hold) -> str:
+    """Who carries the ball for a while."""
     return hold.body.name if hold.body is not None else "somebody"

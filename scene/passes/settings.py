@@ -224,6 +224,6 @@ def picture_name(hits: BeyondMocapHits) -> str:
 
 
 def picture_icon(hits: BeyondMocapHits) -> int:
-    """The picture's number for a layout; 0 while it is not painted (`graph.paint`)."""
+    """The picture's number for a layout; 0 while it is not painted (`hits_shown.paint`)."""
     kept, name = pictures.get("graphs"), picture_name(hits)
     return kept[name].icon_id if kept is not None and name in kept else 0

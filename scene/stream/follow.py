@@ -174,10 +174,7 @@ def _tick() -> float:
 def _end() -> None:
     stop_listening()
     _on_hit.clear()
-
     _on_look.clear()
-
-
 
 
 def start_listening(settings) -> Listener:

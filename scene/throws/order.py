@@ -1,4 +1,4 @@
-"""What is asked of an armature, as plain values.
+"""What is asked of an armature, as plain values; where what is aimed at is, or the way on which the ball meets it.
 
 Seconds are scene frames over the scene's rate, so the throw's frames are the scene's.
 """
@@ -11,20 +11,26 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked, preferences, session
-from ..core.measure import frames_per_second
+from ..core.measure import frames_per_second, units_per_metre
 from ..core.settings import absolute
 from ..passes import possession
+from ..path_editing.rig_look import alone
 from ..rigs import armature
-from . import earlier, rigged, targets
-from .settings import LIMBS, USUAL
+from . import flown, rigged
+from .settings import LIMBS, USUAL, BeyondMocapThrow
 
 if TYPE_CHECKING:
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.motion.skeleton import Skeleton
+
+TARGET_SECONDS = 8.0
+"""Seconds from the release on in which a target's own way counts."""
+_STILL = 1e-3  # m that a target moves by at most which stands
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +81,7 @@ def digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> str:
     model = wish.throw_model if act == "throw" else wish.kick_model
     ball = wish.ball.name if wish.ball is not None else ""
     plain = (act, wish.side, wish.frame, round(wish.speed, 3), ball, wish.kind, folder, model, wish.seed)
-    return json.dumps([*plain, targets.told_by(scene, wish)])
+    return json.dumps([*plain, target_key(scene, wish)])
 
 
 def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: int = 0) -> Order:
@@ -88,7 +94,7 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
     own, first = _own(scene, body) if rig is None else rigged.own(scene, body)
     place, facing = _stands(scene, body, skeleton) if rig is None else rigged.stands(rig)
     limb, frame = f"{wish.side}_{LIMBS[act]}", frame or wish.frame
-    waits = not frame and (act == "throw" or wish.ball is None or earlier.moves(wish.ball, wish) is None)
+    waits = not frame and (act == "throw" or wish.ball is None or flown.first_motion(wish.ball, wish) is None)
     frame = frame or scene.frame_current
     model = wish.throw_model if act == "throw" else wish.kick_model
     folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
@@ -97,7 +103,7 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
         body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
         lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first,
         place=place,
-        facing=facing, targets=targets.places(scene, wish, frame), at=frame / fps, begins=scene.frame_start / fps,
+        facing=facing, targets=target_places(scene, wish, frame), at=frame / fps, begins=scene.frame_start / fps,
         waits=waits, speed=wish.speed,
         kind=USUAL[act] if wish.kind == "usual" else wish.kind,
         ball_place=_lies(scene, wish, frame) if act == "kick" else None,
@@ -130,7 +136,7 @@ def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
         raise InputError("ball", f"{ball.name} is not in this scene", "a ball of this scene", "pick another")
     channels.check_free(ball)
     possession.check_unaimed(ball)
-    other = earlier.flies_for(ball, body)
+    other = flown.flies_for(ball, body)
     if other is not None:
         raise InputError(f"ball {ball.name}", f"it flies for {other.name}", "a ball that no throw shows yet",
                          f"press Keep or Leave at {other.name} first, or choose another ball")  # fmt: skip
@@ -178,4 +184,65 @@ def _lies(scene: bpy.types.Scene, wish, frame: int) -> np.ndarray | None:
     ball = wish.ball
     if ball is None:
         return None
-    return earlier.place_at(scene, ball, wish, frame)
+    return flown.place_at(scene, ball, wish, frame)
+
+
+def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
+    """(F, 3) m: where the target is on each frame from `frame` on; (1, 3) for one that stands. InputError below the
+    ground or in another scene."""
+    target, metres = wish.target, 1.0 / units_per_metre(scene)
+    if target is None:
+        found = np.array([scene.cursor.location]) * metres
+    elif target.name not in scene.objects:
+        raise InputError("target", f"{target.name} is not in this scene", "an object of this scene", "pick another")
+    elif _may_move(target):
+        found = _target_way(scene, target, frame) * metres
+        if np.ptp(found, axis=0).max() < _STILL:
+            found = found[:1]
+    else:
+        found = np.array([_resting(target).translation]) * metres
+    below = found[:, 2].min()
+    if below < 0.0:
+        raise InputError(
+            "target", f"{-below:.2f} m below the ground", "one on or above it, where balls get", "raise it"
+        )
+    return found
+
+
+def target_key(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> list | str:
+    """Where the target is, units, or the name of one that may move by itself."""
+    target = wish.target
+    if target is not None and _may_move(target):
+        return target.name
+    place = scene.cursor.location if target is None else _resting(target).translation
+    return [round(value, 5) for value in place]
+
+
+def _may_move(thing: bpy.types.Object) -> bool:
+    """Whether keys, drivers or constraints have a say in where an object is, or in where its parents are."""
+    while thing is not None:
+        if thing.animation_data is not None or len(thing.constraints) or thing.type == "ARMATURE" or thing.rigid_body:
+            return True
+        thing = thing.parent
+    return False
+
+
+def _resting(thing: bpy.types.Object) -> Matrix:
+    """Where an object is that nothing moves. Worked out, since Blender forgets the matrix_world of what is hidden with
+    the next undo or load."""
+    parent = thing.parent
+    if parent is None:
+        return thing.matrix_basis
+    if thing.parent_type != "OBJECT" or parent.type == "CURVE":
+        return thing.matrix_world
+    return _resting(parent) @ thing.matrix_parent_inverse @ thing.matrix_basis
+
+
+def _target_way(scene: bpy.types.Scene, target: bpy.types.Object, frame: int) -> np.ndarray:
+    """(F, 3) units: where a target is from a frame on."""
+    found = []
+    with alone(target, scene) as side:
+        for at in range(frame, frame + int(TARGET_SECONDS * frames_per_second(scene)) + 1):
+            side.frame_set(at)
+            found.append(target.evaluated_get(side.view_layers[0].depsgraph).matrix_world.translation[:])
+    return np.array(found)

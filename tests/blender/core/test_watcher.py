@@ -285,8 +285,8 @@ def a_live_update(room, _context):
     """Throws, flights, overlays and figures are worked out in threads of their own."""
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
-            for name in ("throws.live", "passes.live", "overlays.store", "path_editing.measure")]
-    room("scene.throws.live")._seen["job"] = "body", 0, jobs[0]
+            for name in ("throws.shown", "passes.live", "overlays.store", "path_editing.measure")]
+    room("scene.throws.shown")._seen["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))
     room("scene.path_editing.measure")._running.append((jobs[3], 0, 0))
