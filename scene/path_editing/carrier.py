@@ -1,4 +1,5 @@
-"""What carries a motion: how an armature's motion is read, and how the ridden one is written onto it.
+"""What carries a motion: how an armature's motion is read, and how the ridden one is written onto it. The original,
+relative to its own path, is worked out once and kept as long as nothing of it changes.
 
 `PlainCarrier` knows armatures whose bones are keyed themselves. Other kinds are in `rigs`, where `carrier_of` chooses.
 """
@@ -12,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels, linked
@@ -23,6 +24,12 @@ from . import keys
 
 MARK = "beyond_mocap_ride"
 """Custom property of an action that a rider plays: a digest of what it was made of."""
+MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
+
+_sources: dict[int, Source] = {}  # by session_uid of the armature
+# likewise: the original action and its keys' digest, until they may have changed
+_keys: dict[int, tuple[int, bytes]] = {}
+_refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of what could not be read, and why
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,6 +214,53 @@ class PlainCarrier(Carrier):
             mode = bones[joint].rotation_mode
             found |= _columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """read: the original motion; core: it relative to its own path; digest: of what both were made of."""
+
+    read: Read
+    core: object
+    digest: bytes
+
+
+def forget_sources() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _sources.clear()
+    recheck_sources()
+
+
+def recheck_sources() -> None:
+    """Keys of any original may be others: they are looked at again, those too that could not be read."""
+    _keys.clear()
+    _refused.clear()
+
+
+def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
+    """An armature's original motion for these settings of the core. InputError where there is none."""
+    from ...beyond_mocap.path_editing.ride import prepare
+
+    uid, wishes = carrier.body.session_uid, tuple(getattr(settings, name) for name in MADE_OF)
+    original = carrier.source()[0]
+    number = original.session_uid if original is not None else 0
+    if uid not in _keys or _keys[uid][0] != number:
+        _keys[uid] = number, carrier.keys_digest()
+    digest = byte_digest(_keys[uid][1], carrier.stamp(scene), repr(wishes))
+    known = _sources.get(uid)
+    if known is not None and known.digest == digest:
+        return known
+    if _refused.get(uid, (b"", ""))[0] == digest:
+        raise BeyondMocapError(_refused[uid][1])
+    keys.refresh()
+    try:
+        read = carrier.read(scene)
+        found = Source(read, prepare(read.motion, settings, read.standing), digest)
+    except BeyondMocapError as error:  # to look at a rig is a change of frame: it would be looked at again and again
+        _refused[uid] = digest, str(error)
+        raise
+    _sources[uid] = found
+    return found
 
 
 def _path(bone: bpy.types.PoseBone, what: str) -> str:

@@ -13,8 +13,8 @@ from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..core import channels, linked
 from ..core.set_aside import drop, play_as_before
-from . import curve, keys, source
-from .carrier import MARK
+from . import curve, keys
+from .carrier import MARK, forget_sources, read_source, recheck_sources
 from .rigs import carrier_of
 from .settings import choose, riders, wishes
 
@@ -63,7 +63,8 @@ _counted = 0
 def forget() -> None:
     """Nothing is remembered any more: another file is open."""
     _shown.clear()
-    source.forget()
+    forget_sources()
+    curve.forget_grounds()
     keys.forget()
 
 
@@ -94,11 +95,11 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     carrier.check()
     if anew:
         bpy.context.view_layer.update()
-        source.unsure()
+        recheck_sources()
         keys.refresh()
     settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
-    known = source.of(carrier, scene, settings)
-    ground = source.ground_digest(scene, ridden_by.ground)
+    known = read_source(carrier, scene, settings)
+    ground = curve.ground_digest(scene, ridden_by.ground)
     digest = byte_digest(known.digest, drawn.digest, ground, repr(settings)).hex()
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
@@ -108,12 +109,12 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
-    ridden = ride(known.core, path, settings, source.ground_of(scene, ridden_by.ground, ground))
+    ridden = ride(known.core, path, settings, curve.ground_of(scene, ridden_by.ground, ground))
     if anew or not up_to_date:
         carrier.write(scene, known.read, ridden, digest)
     _counted += 1
     first, fps = known.read.first, known.read.motion.fps
-    told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
+    told = "\n".join((*drawn.notes, *curve.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
     now = Shown(first, fps, known.core, path=path, ridden=ridden, number=_counted, told=told)
     _shown[body.session_uid] = digest, now
     _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
@@ -161,8 +162,8 @@ def begin(
         )
     carrier.check()
     context.view_layer.update()
-    source.unsure()
-    known = source.of(carrier, scene, RideSettings(**wishes(ride))).core
+    recheck_sources()
+    known = read_source(carrier, scene, RideSettings(**wishes(ride))).core
     before = ride.curve
     if drawn is None and not (straight or count) and before is not None and before.name in scene.objects:
         drawn = before
@@ -214,7 +215,7 @@ def new_curve(
         path, straight = curve.read(scene, before).path(), False
     else:
         settings = RideSettings(**wishes(ride))
-        path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
+        path, straight = _own_path(read_source(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
     made = curve.create(context, f"{body.name} path", path, straight=straight, count=count, kind=kind, degree=degree)
     try:
         change(scene, body, made)
