@@ -16,10 +16,9 @@ from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import active_player
 from ..scene.path_editing import riders
 from ..scene.result import bake
-from ..scene.rigs import bake_record, bone_maps, export, rig, rig_bake, rig_copy
+from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
 from ..scene.rigs.driven import Driven, check
-from ..scene.rigs.fit import BakeOptions
-from ..scene.rigs.source import source_of
+from ..scene.rigs.fit import BakeOptions, source_of
 from .verb import ExportVerb, Verb
 
 
@@ -203,7 +202,7 @@ on the ground. What the rig played before is kept as an action"""
             Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
         for player in lacking:
-            player.rig = free or rig_copy.copied(settings.rig.target, f"{player.name} rig")
+            player.rig = free or armature.copy_rig(settings.rig.target, f"{player.name} rig")
             free = None
         context.view_layer.update()
         return [(player.body, player, player.rig, table_for(settings.rig, player.rig)) for player in players]
@@ -221,11 +220,11 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
         cls.poll_message_set("The chosen rig plays nothing that was baked here")
         target = context.scene.beyond_mocap.rig.target
         playing = channels.playing(target)[0] if target is not None else None
-        return playing is not None and bool(playing.get(bake_record.MARK))
+        return playing is not None and bool(playing.get(rig_bake.MARK))
 
     def do(self, context):
         """Off with it."""
-        bake_record.remove(context.scene.beyond_mocap.rig.target)
+        rig_bake.remove_bake(context.scene.beyond_mocap.rig.target)
 
 
 class BEYOND_MOCAP_OT_reduce_keys(Verb, bpy.types.Operator):

@@ -1,7 +1,8 @@
 """Riders keep apart: which of them come too near each other, or another body, and what each is asked to do about it.
 
 What is asked is part of a rider's settings: seconds added to its delay, and detours of its path. Each time it is worked
-out from the curves as they are drawn and the delays that the user chose.
+out from the curves as they are drawn and the delays that the user chose. Riders keep clear of bystanders too: bodies of
+the scene that ride no path, such as kept ones and players.
 """
 
 from __future__ import annotations

@@ -1,9 +1,11 @@
-"""Riders follow while curves, settings and grounds are edited, also while a point is being dragged.
+"""Riders follow while curves, settings and grounds are edited, also while a point is being dragged; once at rest, their
+figures are worked out.
 
 Blender says after every change that something has changed; a timer, which runs during modal operators too, then
 compares what each rider's motion was made of with what there is now. Our own writes are such changes too, and find
 nothing to do. An edit from a timer is no undo step: undo brings back the state before, and riders are brought up to
-date with that.
+date with that. Figures (on the path, at their speed, on their feet) take longer than a picture while a path is dragged,
+so a thread works them out; they are kept as JSON with the rider.
 """
 
 from __future__ import annotations
@@ -22,10 +24,8 @@ from .carrier import recheck_sources
 from .settings import riders
 
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
-
 KIND = "path figures"
 REST, LOOK, WAIT = 0.8, 0.4, 0.05  # seconds: without a change, between two looks, between two looks at the thread
-
 KNOWN = '"root_error_m"'  # in the figures of a rider that was measured
 
 _failed: dict[int, int] = {}  # by session_uid of the armature: the number of what could not be measured

@@ -17,8 +17,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, pose_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..rigs import bone_maps
-from ..rigs.driven import upright_turn
-from ..rigs.followers import list_followers
+from ..rigs.driven import list_followers, upright_turn
 from .rig_look import Look
 
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine

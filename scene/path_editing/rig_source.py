@@ -12,7 +12,7 @@ from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs import control_study
-from ..rigs.posing import CHANNELS
+from ..rigs.control_study import CHANNELS
 from . import rig_look, rig_parts
 from .rig_look import channel_of
 from .rig_ride import OBJECT, Carried, Rows, channel_values

@@ -21,7 +21,7 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import play_as_before, put_aside, stance_of, stand
 from ..rigs import armature
 from ..rigs.bone_curves import is_carried
-from ..rigs.posing import CHANNELS
+from ..rigs.control_study import CHANNELS
 from . import keys, rig_parts
 from .carrier import MARK, Carrier, PlainCarrier, Read
 from .rig_source import BONE, RigSource, layered, playing_strips

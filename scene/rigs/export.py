@@ -425,7 +425,7 @@ def saved(out: Path, write_to) -> None:
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     from ...beyond_mocap.files.bvh import bvh
-    from .source import evaluated
+    from .fit import evaluated
 
     frames = np.arange(stage.frame_end + 1)
     for copy in copies:

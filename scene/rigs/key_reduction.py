@@ -16,7 +16,7 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from . import bake_record
+from . import rig_bake
 from .driven import Driven
 
 BEZIER, ALIGNED = 2, "ALIGNED"
@@ -53,12 +53,12 @@ def reduce(
         if np.abs(np.linalg.norm(reach(found) - places, axis=-1)).max(initial=0.0) <= tolerance:
             break
         share *= _TIGHTER
-    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), bake_record.is_as_baked(rig)
+    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), rig_bake.is_as_baked(rig)
     for path, values in dense.items():
         for index in range(values.shape[1]):
             _rekey(curves[path, index], frames, values[:, index], kept[path])
     if as_baked:
-        bake_record.note(rig)
+        rig_bake.note_keys(rig)
     return before, sum(len(curve.keyframe_points) for curve in curves.values())
 
 

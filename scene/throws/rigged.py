@@ -11,10 +11,9 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..path_editing.rigs import carrier_of, is_plain
-from ..rigs import bake_record, bone_maps, rig_bake
+from ..rigs import bone_maps, rig_bake
 from ..rigs.driven import Driven, check
-from ..rigs.fit import BakeOptions
-from ..rigs.source import Source
+from ..rigs.fit import BakeOptions, Source
 from .settings import MARK
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
     fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]
     if played is not None and not played.get(MARK):
-        played.pop(bake_record.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
+        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
     baked = rig_bake.lay(fitted)
     baked.action[MARK] = True
     return baked.told
@@ -82,10 +81,10 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
 
 def take_away(body: bpy.types.Object) -> None:
     """Let a rig play what it did before its throw; a bake below it can be taken away as before."""
-    bake_record.remove(body)
+    rig_bake.remove_bake(body)
     played = channels.playing(body)[0]
-    if played is not None and bake_record.BEFORE in played:
-        played[bake_record.MARK] = True
+    if played is not None and rig_bake.BEFORE in played:
+        played[rig_bake.MARK] = True
 
 
 def _posed_otherwise(body: bpy.types.Object) -> bool:

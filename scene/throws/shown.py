@@ -19,8 +19,8 @@ from ..core.live import Watcher, attempt
 from ..core.measure import frames_per_second
 from ..core.set_aside import bring_back, drop, put_aside
 from ..result import bake
-from ..rigs.bake_record import BEFORE, KEYS
-from ..rigs.bake_record import MARK as BAKE_MARK
+from ..rigs.rig_bake import BEFORE, KEYS
+from ..rigs.rig_bake import MARK as BAKE_MARK
 from . import flown, made, order, rigged
 from .settings import MARK
 
