@@ -1,4 +1,4 @@
-"""A rig's driven bones as a skeleton of the core, upright and facing +X whatever way the rig lies; and the bones that go
+"""A rig's driven bones as a skeleton of the core, upright and facing +X however the rig lies; and the bones that go
 with a part of the body although they do not carry it: IK targets, poles, helper bones."""
 
 from __future__ import annotations

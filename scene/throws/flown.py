@@ -1,10 +1,8 @@
 """The ball of a throw or kick: in the hand or lying, then its flight; and its trajectory as a curve.
 
 Up to the last frame before the release a thrown ball is carried by the hand's bone (`passes.possession`), so that it
-stays in the hand when the pose is worked on. What it did before goes on until then, and comes back with `give_back`: it
-was keyed, thrown before, or carried by others for a while.
+stays in the hand when the pose is worked on. What it did before goes on until then, and comes back with `give_back`.
 """
-
 
 from __future__ import annotations
 
@@ -12,19 +10,18 @@ from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
-from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..ball.shots import CLOSEST, trajectory
 from ..core import channels
 from ..core.measure import units_per_metre
-from ..core.set_aside import bring_back, drop, put_aside, stance_of
+from ..core.set_aside import bring_back, drop, put_aside
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
 from ..result import bake
 from ..stage import ball as balls
+from .order import first_motion, flies_for, taken_from, way_before
 from .settings import MARK, BeyondMocapThrow
 
 if TYPE_CHECKING:
@@ -229,74 +226,3 @@ def _flying(before, flies):
 
 def _joined(before, behind):
     return tuple(np.concatenate(pair) for pair in zip(before, behind))
-
-
-def place_at(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
-    """(3,) m where a ball is on a frame without this throw; InputError where it is carried then."""
-    for hold in _other_holds(ball, wish):
-        if hold.first <= frame < hold.last:
-            raise InputError(f"ball {ball.name}", f"{possession.holder_name(hold)} carries it on frame {frame}",
-                             "a ball that lies", "choose another frame, or free the ball")
-
-    place = way_before(ball, wish, np.array([frame]))[0].to_translation()
-    return np.array(place) / units_per_metre(scene)
-
-
-def first_motion(ball: bpy.types.Object, wish: BeyondMocapThrow) -> int | None:
-    """The first frame on which a ball does something without this throw; None for one that lies all the time."""
-    ends = channels.keyed_range(_own_way(ball, wish)[0])
-    firsts = [hold.first - 1 for hold in _other_holds(ball, wish)] + ([ends[0]] if ends is not None else [])
-    return min(firsts) if firsts else None
-
-
-def way_before(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarray) -> list[Matrix]:
-    """Where a ball is on frames (F,) without this throw, units; as if nobody carried it while somebody does."""
-    curves, stance = _own_way(ball, wish)
-    found, ends = possession.way_of(curves, stance, frames), channels.keyed_range(curves)
-    for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
-        if ends is None or ends[1] <= hold.last:  # it stays where it was let go
-            action, slot = channels.playing(ball)
-            shown = channels.curves(action, slot) if action is not None else {}
-            dropped = possession.way_of(shown, stance_of(ball)[""], np.array([hold.last]))[0]
-            found = [dropped if frame >= hold.last else place for frame, place in zip(frames, found)]
-    return found
-
-
-def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last: int) -> int:
-    """The frame, of first .. last, from which on the hand has a ball that it lets go on `last`: when others have done
-    with it. InputError where they have not."""
-    for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
-        if hold.first < last and first < hold.last:
-            first = hold.last
-            if first >= last - 1:
-                found = f"{possession.holder_name(hold)} carries it on frames {hold.first} to {hold.last}"
-                raise InputError(f"ball {ball.name}", found, "a ball that nobody else carries by then",
-                                 "choose a later frame, or free the ball")
-    return first
-
-
-def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object | None:
-    """Another armature whose throw, not kept yet, this ball shows; one that was deleted counts no more, though its ball
-    keeps it in the file."""
-    return next(
-        (one for one in bpy.data.objects if one.type == "ARMATURE" and one != body and one.beyond_mocap_throw.made
-         and one.beyond_mocap_throw.flown == ball and one.users_scene), None,
-    )  # fmt: skip
-
-
-def _own_way(ball: bpy.types.Object, wish: BeyondMocapThrow) -> tuple[dict, list]:
-    """The curves of a ball's own way without this throw, and how it stands."""
-    own = ball.beyond_mocap_ball.before
-    if wish.flown == ball and wish.ball_before.kept:
-        return possession.played_before(wish.ball_before)
-    if own.kept:
-        return possession.played_before(own)
-    action, slot = channels.playing(ball)
-    return channels.curves(action, slot) if action is not None else {}, stance_of(ball)[""]
-
-
-def _other_holds(ball: bpy.types.Object, wish: BeyondMocapThrow) -> list:
-    """The stretches in which the ball is carried, without this throw's."""
-    return [hold for hold in ball.beyond_mocap_ball.holds if not (wish.flown == ball and hold.name == wish.hold)]
-
-

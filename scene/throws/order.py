@@ -1,4 +1,5 @@
-"""What is asked of an armature, as plain values; where what is aimed at is, or the way on which the ball meets it.
+"""What is asked of an armature, as plain values; where what is aimed at is, or the way on which the ball meets it; what
+the ball does before: keyed, thrown before, or carried by others for a while.
 
 Seconds are scene frames over the scene's rate, so the throw's frames are the scene's.
 """
@@ -16,11 +17,12 @@ from mathutils import Matrix
 from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked, preferences, session
 from ..core.measure import frames_per_second, units_per_metre
+from ..core.set_aside import stance_of
 from ..core.settings import absolute
 from ..passes import possession
 from ..path_editing.rig_look import alone
 from ..rigs import armature
-from . import flown, rigged
+from . import rigged
 from .settings import LIMBS, USUAL, BeyondMocapThrow
 
 if TYPE_CHECKING:
@@ -94,7 +96,7 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
     own, first = _own(scene, body) if rig is None else rigged.own(scene, body)
     place, facing = _stands(scene, body, skeleton) if rig is None else rigged.stands(rig)
     limb, frame = f"{wish.side}_{LIMBS[act]}", frame or wish.frame
-    waits = not frame and (act == "throw" or wish.ball is None or flown.first_motion(wish.ball, wish) is None)
+    waits = not frame and (act == "throw" or wish.ball is None or first_motion(wish.ball, wish) is None)
     frame = frame or scene.frame_current
     model = wish.throw_model if act == "throw" else wish.kick_model
     folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
@@ -136,7 +138,7 @@ def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
         raise InputError("ball", f"{ball.name} is not in this scene", "a ball of this scene", "pick another")
     channels.check_free(ball)
     possession.check_unaimed(ball)
-    other = flown.flies_for(ball, body)
+    other = flies_for(ball, body)
     if other is not None:
         raise InputError(f"ball {ball.name}", f"it flies for {other.name}", "a ball that no throw shows yet",
                          f"press Keep or Leave at {other.name} first, or choose another ball")  # fmt: skip
@@ -144,6 +146,59 @@ def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     if ball.parent is not None or any(one.name not in holds for one in ball.constraints):
         found = "it has a parent or a constraint"
         raise InputError(f"ball {ball.name}", found, "a ball of its own", "clear them, or choose another ball")
+
+
+def place_at(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
+    """(3,) m where a ball is on a frame without this throw; InputError where it is carried then."""
+    for hold in _other_holds(ball, wish):
+        if hold.first <= frame < hold.last:
+            raise InputError(f"ball {ball.name}", f"{possession.holder_name(hold)} carries it on frame {frame}",
+                             "a ball that lies", "choose another frame, or free the ball")
+
+    place = way_before(ball, wish, np.array([frame]))[0].to_translation()
+    return np.array(place) / units_per_metre(scene)
+
+
+def first_motion(ball: bpy.types.Object, wish: BeyondMocapThrow) -> int | None:
+    """The first frame on which a ball does something without this throw; None for one that lies all the time."""
+    ends = channels.keyed_range(_own_way(ball, wish)[0])
+    firsts = [hold.first - 1 for hold in _other_holds(ball, wish)] + ([ends[0]] if ends is not None else [])
+    return min(firsts) if firsts else None
+
+
+def way_before(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarray) -> list[Matrix]:
+    """Where a ball is on frames (F,) without this throw, units; as if nobody carried it while somebody does."""
+    curves, stance = _own_way(ball, wish)
+    found, ends = possession.way_of(curves, stance, frames), channels.keyed_range(curves)
+    for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
+        if ends is None or ends[1] <= hold.last:  # it stays where it was let go
+            action, slot = channels.playing(ball)
+            shown = channels.curves(action, slot) if action is not None else {}
+            dropped = possession.way_of(shown, stance_of(ball)[""], np.array([hold.last]))[0]
+            found = [dropped if frame >= hold.last else place for frame, place in zip(frames, found)]
+    return found
+
+
+def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last: int) -> int:
+    """The frame, of first .. last, from which on the hand has a ball that it lets go on `last`: when others have done
+    with it. InputError where they have not."""
+    for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
+        if hold.first < last and first < hold.last:
+            first = hold.last
+            if first >= last - 1:
+                found = f"{possession.holder_name(hold)} carries it on frames {hold.first} to {hold.last}"
+                raise InputError(f"ball {ball.name}", found, "a ball that nobody else carries by then",
+                                 "choose a later frame, or free the ball")
+    return first
+
+
+def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object | None:
+    """Another armature whose throw, not kept yet, this ball shows; one that was deleted counts no more, though its ball
+    keeps it in the file."""
+    return next(
+        (one for one in bpy.data.objects if one.type == "ARMATURE" and one != body and one.beyond_mocap_throw.made
+         and one.beyond_mocap_throw.flown == ball and one.users_scene), None,
+    )  # fmt: skip
 
 
 def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
@@ -184,7 +239,7 @@ def _lies(scene: bpy.types.Scene, wish, frame: int) -> np.ndarray | None:
     ball = wish.ball
     if ball is None:
         return None
-    return flown.place_at(scene, ball, wish, frame)
+    return place_at(scene, ball, wish, frame)
 
 
 def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
@@ -246,3 +301,19 @@ def _target_way(scene: bpy.types.Scene, target: bpy.types.Object, frame: int) ->
             side.frame_set(at)
             found.append(target.evaluated_get(side.view_layers[0].depsgraph).matrix_world.translation[:])
     return np.array(found)
+
+
+def _own_way(ball: bpy.types.Object, wish: BeyondMocapThrow) -> tuple[dict, list]:
+    """The curves of a ball's own way without this throw, and how it stands."""
+    own = ball.beyond_mocap_ball.before
+    if wish.flown == ball and wish.ball_before.kept:
+        return possession.played_before(wish.ball_before)
+    if own.kept:
+        return possession.played_before(own)
+    action, slot = channels.playing(ball)
+    return channels.curves(action, slot) if action is not None else {}, stance_of(ball)[""]
+
+
+def _other_holds(ball: bpy.types.Object, wish: BeyondMocapThrow) -> list:
+    """The stretches in which the ball is carried, without this throw's."""
+    return [hold for hold in ball.beyond_mocap_ball.holds if not (wish.flown == ball and hold.name == wish.hold)]

@@ -319,7 +319,8 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     own = rig.animation_data.action.name
     settings = choose(rig, body)
     settings.root = "SMOOTH"
-    before = {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.control_study"].CHANNELS] for b in rig.pose.bones}
+    channels = rooms["rigs.control_study"].CHANNELS
+    before = {b.name: [tuple(getattr(b, c)) for c in channels] for b in rig.pose.bones}
     actions = sorted(a.name for a in bpy.data.actions)
     press(bpy.ops.beyond_mocap.bake_to_rig)
     press(bpy.ops.beyond_mocap.bake_to_rig)
@@ -327,7 +328,7 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     bpy.context.scene.frame_set(START + 30)
     press(bpy.ops.beyond_mocap.unbake)
     assert rig.animation_data.action.name == own and sorted(a.name for a in bpy.data.actions) == actions
-    assert {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.control_study"].CHANNELS] for b in rig.pose.bones} == before
+    assert {b.name: [tuple(getattr(b, c)) for c in channels] for b in rig.pose.bones} == before
 
 
 def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
@@ -404,7 +405,8 @@ def test_a_copy_plays_nothing_and_a_bad_map_copies_nothing(rooms, body):
     data = rig.animation_data
     data.nla_tracks.new().strips.new("own", 1, data.action)
     data.action = None
-    assert len(rooms["rigs.armature"].copy_rig(rig, "twin").animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
+    twin = rooms["rigs.armature"].copy_rig(rig, "twin")
+    assert len(twin.animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
     settings.rig.target = rig
     for number in range(2):
         player = settings.players.add()

@@ -676,7 +676,7 @@ def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
 
 def test_a_deleted_thrower_does_not_keep_the_ball(room):
     body, other, ball = a_body(), a_body(), a_ball((0.3, 0.2, 0.11))
-    wish, earlier = body.beyond_mocap_throw, room("throws.flown")
+    wish, earlier = body.beyond_mocap_throw, room("throws.order")
     wish.made, wish.flown = "throw", ball
     bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
     room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
