@@ -28,28 +28,23 @@ class BeyondMocapAim(bpy.types.PropertyGroup):
     attached_to = ("Object.beyond_mocap_aim",)
 
     on: BoolProperty(name="Aimed", description="Whether this ball is aimed at a target")
-    body: PointerProperty(
-        name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=changed,
-        description="The armature that strikes the ball; none: it leaves from where it lies",
-    )
-    place: FloatVectorProperty(
-        name="From", size=3, options={"HIDDEN"}, description="Where the ball lies when nobody strikes it, metres"
-    )
-    target: PointerProperty(
-        name="Target", type=bpy.types.Object, update=changed, description="Where the ball arrives; drag it with G"
-    )
+    body: PointerProperty(name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
+                          update=changed,
+                          description="The armature that strikes the ball; none: it leaves from where it lies")
+    place: FloatVectorProperty(name="From", size=3, options={"HIDDEN"},
+                               description="Where the ball lies when nobody strikes it, metres")
+    target: PointerProperty(name="Target", type=bpy.types.Object, update=changed,
+                            description="Where the ball arrives; drag it with G")
     curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="The curve along the ball's way")
     told: StringProperty(name="Told", options={"HIDDEN"}, description="What is wrong, if anything")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the shot that is shown")
     strike: IntProperty(name="Strike", options={"HIDDEN"}, description="Scene frame on which the ball is struck")
     arrived: FloatProperty(name="Arrived", options={"HIDDEN"}, description="Scene frame on which it is at the target")
     before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before it was aimed")
-    handed: BoolProperty(
-        name="Handed Over", options={"HIDDEN"}, description="Whether Blender's rigid bodies have the ball"
-    )
-    handed_before: StringProperty(
-        name="Handed Before", options={"HIDDEN"}, description="What the handover has to bring back, as JSON"
-    )
+    handed: BoolProperty(name="Handed Over", options={"HIDDEN"},
+                         description="Whether Blender's rigid bodies have the ball")
+    handed_before: StringProperty(name="Handed Before", options={"HIDDEN"},
+                                  description="What the handover has to bring back, as JSON")
 
 
 def aimed(scene: bpy.types.Scene) -> list[bpy.types.Object]:

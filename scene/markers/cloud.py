@@ -88,9 +88,7 @@ def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene)
         mesh = before.data
         bpy.data.objects.remove(before)
         bpy.data.meshes.remove(mesh)
-    cloud.data.attributes["position"].data.foreach_set(
-        "vector", places[0, markers(cloud)].astype(np.float32).ravel()
-    )
+    cloud.data.attributes["position"].data.foreach_set("vector", places[0, markers(cloud)].astype(np.float32).ravel())
     nodes.draw_lines(cloud)
 
 

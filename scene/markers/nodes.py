@@ -21,19 +21,15 @@ NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"
 """Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which
 marker it is."""
-COLOURS = (
-    ("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
-    ("Marker without segment", (0.95, 0.55, 0.02)),
-)  # fmt: skip
-INPUTS = (
-    ("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
-    ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
-    ("Samples", "NodeSocketInt", 1, "How many samples there are"),
-    ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
-    ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
-    ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
-    ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"),
-)
+COLOURS = (("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
+           ("Marker without segment", (0.95, 0.55, 0.02)))
+INPUTS = (("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
+          ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
+          ("Samples", "NodeSocketInt", 1, "How many samples there are"),
+          ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
+          ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
+          ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
+          ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"))
 
 NEIGHBOURS = 3  # edges that each marker begins
 

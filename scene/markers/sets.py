@@ -25,10 +25,8 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     kept = cloud.beyond_mocap_cloud
     told = {row.name: (row.segment.strip(), row.landmark, row.role) for row in kept.labels}
     if not any(segment for segment, *_ in told.values()):
-        raise InputError(
-            cloud.name, "no marker belongs to a segment", "some that do",
-            "load a marker set, or select markers in Edit Mode and press Assign",
-        )
+        raise InputError(cloud.name, "no marker belongs to a segment", "some that do",
+                         "load a marker set, or select markers in Edit Mode and press Assign")
     before = _applied(cloud)
     if is_cloud(kept.static):
         told = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in kept.static.beyond_mocap_cloud.labels
@@ -42,13 +40,11 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
                 marked.setdefault(point, []).append(label)
     on_body = [label for labels in carried.values() for label in labels]
     having = {how: [label for label, row in told.items() if row[2] == how] for how in ("STATIC", "OPTIONAL")}
-    return MarkerSet(
-        name or kept.set_name or OWN, carried, marked, before.aliases if before is not None else {},
-        static=frozenset(having["STATIC"]) & frozenset(on_body),
-        optional=frozenset(having["OPTIONAL"]) & frozenset(on_body),
-        ball=tuple(label for label, row in told.items() if row[2] == "BALL"),
-        other=tuple(label for label, row in told.items() if row[2] == "OTHER"),
-    )
+    return MarkerSet(name or kept.set_name or OWN, carried, marked, before.aliases if before is not None else {},
+                     static=frozenset(having["STATIC"]) & frozenset(on_body),
+                     optional=frozenset(having["OPTIONAL"]) & frozenset(on_body),
+                     ball=tuple(label for label, row in told.items() if row[2] == "BALL"),
+                     other=tuple(label for label, row in told.items() if row[2] == "OTHER"))
 
 
 def _applied(cloud: bpy.types.Object) -> "MarkerSet | None":
@@ -100,10 +96,8 @@ def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
 
 def role(marker_set: "MarkerSet", label: str) -> str:
     """A label's role in a set."""
-    table = (
-        ("BALL", marker_set.ball), ("OTHER", marker_set.other), ("STATIC", marker_set.static),
-        ("OPTIONAL", marker_set.optional),
-    )  # fmt: skip
+    table = (("BALL", marker_set.ball), ("OTHER", marker_set.other), ("STATIC", marker_set.static),
+             ("OPTIONAL", marker_set.optional))
     return next((name for name, labels in table if label in labels), "NEEDED")
 
 

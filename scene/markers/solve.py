@@ -65,11 +65,9 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     clouds.played_rate(cloud, scene)
     static = _static_of(cloud, scene)
     words = tuple(chosen.words.split()) if chosen.add else ()
-    return Order(
-        cloud.name, trial, static and clouds.read(static, scene),
-        model=model_of(cloud) if kept.use_model else None, settings=settings_of(cloud, chosen, words),
-        add=clip_place(scene, cloud.name) if chosen.add else None, words=words,
-    )
+    return Order(cloud.name, trial, static and clouds.read(static, scene),
+                 model=model_of(cloud) if kept.use_model else None, settings=settings_of(cloud, chosen, words),
+                 add=clip_place(scene, cloud.name) if chosen.add else None, words=words)
 
 
 def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -89,10 +87,9 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
 
     assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
     throw = any(word.startswith("throw") for word in words)
-    return ReconstructSettings(
-        marker_set=sets.of_cloud(cloud) if assigned else None, release="yes" if throw else "auto",
-        **property_values(ReconstructSettings, chosen, "markers"),
-    )
+    return ReconstructSettings(marker_set=sets.of_cloud(cloud) if assigned else None,
+                               release="yes" if throw else "auto",
+                               **property_values(ReconstructSettings, chosen, "markers"))
 
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:
@@ -231,13 +228,9 @@ def show_release(context: bpy.types.Context, cloud: bpy.types.Object, found: "Re
 
 def release_lines(found: "Release") -> list[str]:
     """Lines "name: value" for the panel."""
-    told = [
-        f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s",
-        f"That is: {3.6 * found.speed:.0f} km/h",
-        f"Released: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms",
-        f"Hand: {found.side}",
-        f"Told by: {found.how}",
-    ]
+    told = [f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s", f"That is: {3.6 * found.speed:.0f} km/h",
+            f"Released: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms", f"Hand: {found.side}",
+            f"Told by: {found.how}"]
     if found.radar is not None:
         told.append(f"Radar: {found.radar:.1f} m/s, {100.0 * (found.speed / found.radar - 1.0):+.1f} %")
     return [*told, *found.notes]

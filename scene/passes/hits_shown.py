@@ -77,13 +77,11 @@ def summary(found: "Hits", first: int) -> dict:
         name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
         for name in ("height", "speed")
     }
-    return {
-        "first": int(first), "count": count, "fps": round(float(found.fps), 4),
-        "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
-        "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),
-        "links": _pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
-        "keys": [int(one.key) for one in found.motions],
-    }
+    return {"first": int(first), "count": count, "fps": round(float(found.fps), 4),
+            "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
+            "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),
+            "links": _pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
+            "keys": [int(one.key) for one in found.motions]}
 
 
 def lines(found: "Hits", first: int) -> list[str]:

@@ -99,6 +99,5 @@ def forget() -> None:
     make.forget_rallies()
 
 
-WATCHER = Watcher(
-    name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=make.forget_rallies, ends=forget,
-)
+WATCHER = Watcher(name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=make.forget_rallies,
+                  ends=forget)

@@ -92,10 +92,9 @@ def order_of(scene: bpy.types.Scene) -> Order:
     chosen = settings.library_folder or common.library_folder
     folder = absolute(chosen)
     if not folder:
-        raise InputError(
-            "library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
-            "choose one under Choices, or in step 1",
-        )
+        raise InputError("library", "no folder chosen",
+                         "a folder of clips with strikes, such as sample_blend/passes/library",
+                         "choose one under Choices, or in step 1")
     for row in settings.players:
         _check(row)
     shown.check(*settings.players)
@@ -106,10 +105,8 @@ def order_of(scene: bpy.types.Scene) -> Order:
     unit = (common.library_unit or None) if not settings.library_folder else None
     # without the library's folder: a file may be moved with it
     digest = byte_digest(repr((wanted, chosen, unit, settings.start_frame))).hex()
-    return Order(
-        wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit), digest=digest,
-        build=preferences.for_build(folder),
-    )
+    return Order(wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit),
+                 digest=digest, build=preferences.for_build(folder))
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
@@ -189,11 +186,10 @@ def figures(made: "Passes") -> list[str]:
     """Lines "name: value" about the scene."""
     gaps = [gap for one in made.players for gap in one.gaps if not np.isnan(gap)]
     speeds = [float(np.linalg.norm(one.velocity_out)) for one in made.plan.strikes]
-    return [
-        f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
-        f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm", f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
-        f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s",
-    ]
+    return [f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
+            f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm",
+            f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
+            f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s"]
 
 
 def _check(row: BeyondMocapPasser) -> None:

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
 
 SIZE = 0.5  # metres
-SHIRTS = (
-    (0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
-    (0.02, 0.45, 0.60),
-)
+SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
+          (0.02, 0.45, 0.60))
 NUMBERS = ("radius", "restitution", "linear_drag", "drag", "gravity")
 _DIGITS = 6  # of numbers of single precision
 _MOST_KEPT = 32
@@ -125,9 +123,8 @@ def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float
 
 def _player(scene, row: BeyondMocapPasser) -> Player:
     if row.place is None or row.place.name not in scene.objects:
-        raise InputError(
-            f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place"
-        )
+        raise InputError(f"player {row.name}", "nothing that says where he stands", "an object",
+                         "choose one as his Place")
     place, facing = stands(scene, row.place)
     tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
@@ -145,19 +142,16 @@ def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
         own = (giver.bone or giver.part, giver.side)
         part, side = (mine if mine != "own" else usual for mine, usual in zip((row.part, row.side), own))
         tool = _tool(giver) if part == "tool" else None
-        return Example("", hit=hit_of(scene, row, number, part=part, side="" if side == "either" else side,
-                                               tool=tool))
+        return Example("", hit=hit_of(scene, row, number, part=part, side="" if side == "either" else side, tool=tool))
     return Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
 
 
 def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
-    return Pass(
-        row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
-        seconds=_exact(row.seconds) or None, at=at,
-        example=_example(scene, row, number), error="" if row.error == "none" else row.error,
-    )  # fmt: skip
+    return Pass(row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
+                seconds=_exact(row.seconds) or None, at=at, example=_example(scene, row, number),
+                error="" if row.error == "none" else row.error)
 
 
 def _rate(scene) -> float:
@@ -178,12 +172,10 @@ def _weights(row) -> Weights:
         try:
             bones[name.strip()] = float(number)
         except ValueError:
-            raise InputError(
-                "weights of bones", item.strip(), "bones with a number each, such as left foot 2, head 0.5"
-            ) from None
-    return Weights(
-        *(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones
-    )
+            raise InputError("weights of bones", item.strip(),
+                             "bones with a number each, such as left foot 2, head 0.5") from None
+    return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")),
+                   bones)
 
 
 def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
@@ -266,14 +258,11 @@ def hit_of(
     """
     body, where = row.actor, f"pass {number}: Like Armature"
     if body is None or body.name not in scene.objects:
-        raise InputError(
-            where, f"{row.actor_known or body.name} is not in the scene any more", "an armature that strikes",
-            "choose another one, or empty the field",
-        )
+        raise InputError(where, f"{row.actor_known or body.name} is not in the scene any more",
+                         "an armature that strikes", "choose another one, or empty the field")
     if any(body in (player.body, player.shown) for player in scene.beyond_mocap_passes.players):
-        raise InputError(
-            where, f"{body.name}, which plays this scene itself", "another armature", "duplicate it before"
-        )
+        raise InputError(where, f"{body.name}, which plays this scene itself", "another armature",
+                         "duplicate it before")
     if row.actor_cut and row.actor_last <= row.actor_first:
         raise InputError(where, f"frames {row.actor_first} to {row.actor_last}", "the later frame last")
     carrier, action = carrier_of(body), body.animation_data and body.animation_data.action

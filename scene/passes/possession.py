@@ -44,9 +44,8 @@ def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str
         "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest,
     }[part]  # fmt: skip
     if joint is None:
-        raise InputError(
-            f"armature {body.name}", f"no bone for {part}", "a humanoid", "choose another part, or name the bone"
-        )
+        raise InputError(f"armature {body.name}", f"no bone for {part}", "a humanoid",
+                         "choose another part, or name the bone")
     return skeleton.names[joint]
 
 
@@ -60,10 +59,9 @@ def take(
     _check(ball, body, bone, first, last)
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
-            raise InputError(
-                f"ball {ball.name}", f"carried by {holder_name(other)} on frames {other.first} to {other.last} already",
-                "other frames", "free the ball there first",
-            )
+            raise InputError(f"ball {ball.name}",
+                             f"carried by {holder_name(other)} on frames {other.first} to {other.last} already",
+                             "other frames", "free the ball there first")
     if not ball.beyond_mocap_ball.before.kept:
         put_aside(ball.beyond_mocap_ball.before, ball)
     hold = ball.beyond_mocap_ball.holds.add()
@@ -168,9 +166,8 @@ def check_unaimed(ball: bpy.types.Object) -> None:
     lost."""
     aim = ball.beyond_mocap_aim
     if aim.handed:
-        raise InputError(
-            f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed", "press Take Ball Back first"
-        )
+        raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed",
+                         "press Take Ball Back first")
     if aim.on:
         raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not", "press Leave Aim first")
 
@@ -180,13 +177,11 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
     channels.check_free(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:
-        raise InputError(
-            f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode"
-        )
+        raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones",
+                         "look at their names in pose mode")
     if last <= first:
-        raise InputError(
-            "possession", f"from frame {first} to {last}", "a last frame behind the first", "set From and To"
-        )
+        raise InputError("possession", f"from frame {first} to {last}", "a last frame behind the first",
+                         "set From and To")
     if ball.parent is not None:
         raise InputError(f"ball {ball.name}", f"a child of {ball.parent.name}", "an object without a parent",
                          "clear its parent with Alt-P, Clear and Keep Transformation")
@@ -196,10 +191,8 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
         and playing.use_nla
         and any(not track.mute and len(track.strips) for track in playing.nla_tracks)
     ):
-        raise InputError(
-            f"ball {ball.name}", "it plays NLA strips", "an action of its own",
-            "bake them: NLA editor, Edit, Bake Action",
-        )
+        raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own",
+                         "bake them: NLA editor, Edit, Bake Action")
     if ball == body or ball.type == "ARMATURE":
         raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
 

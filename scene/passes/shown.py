@@ -92,7 +92,6 @@ def remove_tool(body: bpy.types.Object) -> None:
 
 def _rod(shape: bmesh.types.BMesh, start: float, end: float, radius: float) -> None:
     """A rod along Z, metres."""
-    made = bmesh.ops.create_cone(
-        shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius, depth=end - start
-    )
+    made = bmesh.ops.create_cone(shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius,
+                                 depth=end - start)
     bmesh.ops.translate(shape, verts=made["verts"], vec=(0.0, 0.0, 0.5 * (start + end)))

@@ -78,9 +78,8 @@ class Carrier(ABC):
             raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
                              "make it editable: Outliner, Library Override, Make")
         if body.mode == "EDIT":
-            raise InputError(
-                f"armature {body.name}", "its bones are being edited", "object or pose mode", "leave edit mode (Tab)"
-            )
+            raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
+                             "leave edit mode (Tab)")
         channels.check_free(body)
 
     @abstractmethod
@@ -124,8 +123,7 @@ class Carrier(ABC):
         found, slot = channels.playing(self.body)
         if found is None or not found.get(MARK):
             raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride",
-                             "that action",
-                             "choose it again in the Action Editor, or press Leave")
+                             "that action", "choose it again in the Action Editor, or press Leave")
         linked.refuse(found)
         if found.users - found.use_fake_user < 2:
             return found, slot
@@ -145,9 +143,8 @@ class PlainCarrier(Carrier):
     def _original(self) -> tuple[bpy.types.Action, object]:
         found, slot = self.source()
         if found is None:
-            raise InputError(
-                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion",
+                             "import one, or choose an action")
         return found, slot
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:

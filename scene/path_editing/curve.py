@@ -16,15 +16,11 @@ from ...beyond_mocap.motion.path.path import Path
 from ..core.measure import units_per_metre
 from ..player.drawn_track import points_of
 
-KINDS = (
-    ("BEZIER", "Bezier", "Points on the path, with handles"),
-    ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"),
-)
-SHAPES = (
-    ("FITTED", "Original", "Along the original path"),
-    ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
-    ("PRESENT", "As It Is", "Along the new path as it is, with other points"),
-)
+KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
+         ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
+SHAPES = (("FITTED", "Original", "Along the original path"),
+          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
+          ("PRESENT", "As It Is", "Along the new path as it is, with other points"))
 MARK = "beyond_mocap_path"  # on curve objects that were made here
 _STEP, _PIECES = 0.04, (8, 600)  # metres between places on a Bezier segment; how many there are of them
 _NURBS_PIECES = 48
@@ -84,9 +80,8 @@ class Drawn:
 def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
     """A curve object as it is drawn now. InputError where it has no line."""
     if drawn is None or drawn.name not in scene.objects:
-        raise InputError(
-            "new path", "its curve is gone from the scene", "a curve object", "choose another, or make a New Curve"
-        )
+        raise InputError("new path", "its curve is gone from the scene", "a curve object",
+                         "choose another, or make a New Curve")
     if drawn.type != "CURVE":
         raise InputError(f"object {drawn.name}", "no curve", "a curve object (Add > Curve)", "choose another")
     lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]

@@ -157,9 +157,8 @@ def begin(
 
     scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
     if ride.on:
-        raise InputError(
-            f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave"
-        )
+        raise InputError(f"armature {body.name}", "it rides already", "one that does not",
+                         "edit its curve, or press Leave")
     carrier.check()
     context.view_layer.update()
     recheck_sources()
@@ -325,12 +324,11 @@ def _own_path(known, straight: bool):
 def _figures(known, ridden) -> dict:
     """What a panel says of a result, in metres and seconds."""
     motion = ridden.motion
-    return {
-        "seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
-        "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3), "source_metres": round(float(known.arc.length), 3),
-        "seams": len(ridden.seams), "correction": round(float(np.percentile(ridden.correction, 95)), 4),
-        "miss": round(float(ridden.miss.max(initial=0.0)), 4),
-    }
+    return {"seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
+            "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3),
+            "source_metres": round(float(known.arc.length), 3), "seams": len(ridden.seams),
+            "correction": round(float(np.percentile(ridden.correction, 95)), 4),
+            "miss": round(float(ridden.miss.max(initial=0.0)), 4)}
 
 
 def tell(body: bpy.types.Object, line: str) -> None:

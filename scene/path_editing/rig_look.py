@@ -102,11 +102,9 @@ def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, other
         for path, rows in more.items():
             rows.append(_numbers(shown.path_resolve(path)))
     modes = [bone.rotation_mode for bone in rig.pose.bones]
-    return Look(
-        np.asarray(frames, float), lies, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float), modes=modes,
-        channels={name: table.astype(float) for name, table in channels.items()},
-        others={path: np.array(rows, float).reshape(count, -1) for path, rows in more.items()},
-    )  # fmt: skip
+    return Look(np.asarray(frames, float), lies, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float),
+                modes=modes, channels={name: table.astype(float) for name, table in channels.items()},
+                others={path: np.array(rows, float).reshape(count, -1) for path, rows in more.items()})
 
 
 def _numbers(value) -> list[float]:

@@ -23,11 +23,9 @@ from .rig_look import Look
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
 _STRETCH, _OFF = 1e-3, 3e-4  # metres
 _UPRIGHT = 0.64  # cosine of the angle between a standing body's trunk and the vertical, at most
-_CARRIERS = {
-    "neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
-    "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
-    "toe": ("foot",),
-}  # fmt: skip
+_CARRIERS = {"neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
+             "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
+             "toe": ("foot",)}
 
 
 @dataclass(frozen=True, eq=False)

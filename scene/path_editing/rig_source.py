@@ -138,9 +138,8 @@ class Played:
             found |= own
             ends.append(extent or channels.keyed_range(own))
         if not found:
-            raise InputError(
-                f"armature {rig.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise InputError(f"armature {rig.name}", "it plays no action", "a motion",
+                             "import one, or choose an action")
         first = int(np.ceil(min(a for a, _ in ends) - 1e-4))
         last = int(np.floor(max(b for _, b in ends) + 1e-4))
         if any(_cycles(curve) for curve in found.values()):
@@ -148,8 +147,7 @@ class Played:
             self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
         if not 1 <= last - first < _MOST:
             raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}",
-                             f"2 to {_MOST} frames",
-                             "key more than one frame")
+                             f"2 to {_MOST} frames", "key more than one frame")
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)
         paths = {path for path, _ in found}

@@ -47,9 +47,8 @@ class RigCarrier(Carrier):
         if self.body.type != "ARMATURE" or not len(self.body.data.bones):
             raise InputError(f"armature {self.body.name}", "no bones", "an armature with bones")
         if not self.ride.on and self.source()[0] is None and not playing_strips(self.body):
-            raise InputError(
-                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion",
+                             "import one, or choose an action")
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
         body = self.body

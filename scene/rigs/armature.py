@@ -182,14 +182,8 @@ def _roll_target(tail: np.ndarray) -> Vector:
 
 
 def _as_table(skeleton: Skeleton, units: float) -> dict:
-    return {
-        "names": skeleton.names,
-        "parents": skeleton.parents,
-        "offsets": skeleton.offsets.tolist(),
-        "end_parents": skeleton.end_parents,
-        "end_offsets": skeleton.end_offsets.tolist(),
-        "units_per_metre": units,
-    }
+    return {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
+            "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units}
 
 
 def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:

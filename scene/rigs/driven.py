@@ -17,13 +17,11 @@ from ..core import channels
 from . import armature, bone_maps
 from .controls import Controls, Override, list_overrides
 
-_NAMED = (
-    (re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),
-    (re.compile(r"(?i)^(.*:)?(ik_hand|hand_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "hand"),
-    (re.compile(r"(?i)^(.*:)?toe_ik(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "toe"),
-    (re.compile(r"(?i)^(.*:)?thigh_ik_target(?=[_\-. ]?[lr]$)"), "upper_leg"),
-    (re.compile(r"(?i)^(.*:)?upper_arm_ik_target(?=[_\-. ]?[lr]$)"), "upper_arm"),
-)
+_NAMED = ((re.compile(r"(?i)^(.*:)?(ik_foot|foot_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "foot"),
+          (re.compile(r"(?i)^(.*:)?(ik_hand|hand_ik)(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "hand"),
+          (re.compile(r"(?i)^(.*:)?toe_ik(?=[_\-. ]?[lr]$|[_\-. ](left|right)$)"), "toe"),
+          (re.compile(r"(?i)^(.*:)?thigh_ik_target(?=[_\-. ]?[lr]$)"), "upper_leg"),
+          (re.compile(r"(?i)^(.*:)?upper_arm_ik_target(?=[_\-. ]?[lr]$)"), "upper_arm"))
 _LEFT = re.compile(r"(?i)(l|left)$")
 _ENDLESS = 99
 

@@ -435,21 +435,19 @@ def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
 
 def _fbx(path: str, engine: str, selected: bool) -> None:
     forward, up = _FBX_AXES[engine]
-    bpy.ops.export_scene.fbx(
-        filepath=path, check_existing=False, use_selection=selected, object_types={"ARMATURE", "MESH", "EMPTY"},
-        axis_forward=forward, axis_up=up, apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY"
-        else "FBX_SCALE_NONE",
-        add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True, bake_anim_use_nla_strips=False,
-        bake_anim_use_all_actions=False, bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0,
-    )
+    bpy.ops.export_scene.fbx(filepath=path, check_existing=False, use_selection=selected,
+                             object_types={"ARMATURE", "MESH", "EMPTY"}, axis_forward=forward, axis_up=up,
+                             apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY" else "FBX_SCALE_NONE",
+                             add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True,
+                             bake_anim_use_nla_strips=False, bake_anim_use_all_actions=False,
+                             bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0)
 
 
 def _glb(path: str, _engine: str, selected: bool) -> None:
-    bpy.ops.export_scene.gltf(
-        filepath=path, check_existing=False, export_format="GLB", use_selection=selected, use_active_scene=True,
-        export_yup=True, export_animations=True, export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
-        export_force_sampling=True, export_optimize_animation_size=False,
-    )
+    bpy.ops.export_scene.gltf(filepath=path, check_existing=False, export_format="GLB", use_selection=selected,
+                              use_active_scene=True, export_yup=True, export_animations=True,
+                              export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
+                              export_force_sampling=True, export_optimize_animation_size=False)
 
 
 def _usd(path: str, engine: str, selected: bool) -> None:

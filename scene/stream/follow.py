@@ -187,9 +187,8 @@ def start_listening(settings) -> Listener:
         raise InputError(f"port {before.port}", "a stream is listened to already", "one at a time", "press Stop Stream")
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
     _held["listener"] = one
-    _held["hits"] = LiveHits(
-        one, settings.part, "" if settings.side == "either" else settings.side, settings.threshold or None
-    )
+    _held["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
+                             settings.threshold or None)
     return one
 
 

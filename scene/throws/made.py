@@ -60,10 +60,8 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     motion, release = _shown(order, thrown, library is not None)
     told: tuple = ()
     if library is not None:
-        way = leave_path(
-            library, own, start, motion, release, at=order.at, action=order.act, progress=_share(progress, 0.3, 1.0),
-            cancelled=cancelled,
-        )
+        way = leave_path(library, own, start, motion, release, at=order.at, action=order.act,
+                         progress=_share(progress, 0.3, 1.0), cancelled=cancelled)
         own, start, told = way.motion, way.start, way.warnings
     fade = FADE if library is not None else EASED[order.act]
     joined = join_throw(own, start, motion, release, at=order.at, goes_on=library is None, fade=fade)
@@ -156,10 +154,8 @@ def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) 
     """The throw that begins, or is at its release, or finds the ball, `where`."""
     from ...beyond_mocap.throws import throw
 
-    asked = throw.Order(
-        target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind,
-        fps=order.fps, seed=order.seed, **where,
-    )
+    asked = throw.Order(target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None,
+                        ball=order.kind, fps=order.fps, seed=order.seed, **where)
     return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
 
 

@@ -101,19 +101,15 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
     model = wish.throw_model if act == "throw" else wish.kick_model
     folder = absolute(common.library_folder) if wish.library and common.library_folder else ""
     unit = common.library_unit or None
-    return Order(
-        body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
-        lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first,
-        place=place,
-        facing=facing, targets=target_places(scene, wish, frame), at=frame / fps, begins=scene.frame_start / fps,
-        waits=waits, speed=wish.speed,
-        kind=USUAL[act] if wish.kind == "usual" else wish.kind,
-        ball_place=_lies(scene, wish, frame) if act == "kick" else None,
-        model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
-        library=session.library(folder, unit) if folder else None,
-        build=preferences.for_build(folder) if folder else {},
-        digest=digest(scene, body, act),
-    )
+    return Order(body=body.name, act=act, limb=limb, skeleton=skeleton, table=rig.table if rig is not None else {},
+                 lift=rigged.lift(rig) if rig is not None and act == "throw" else 0.0, fps=fps, own=own, first=first,
+                 place=place, facing=facing, targets=target_places(scene, wish, frame), at=frame / fps,
+                 begins=scene.frame_start / fps, waits=waits, speed=wish.speed,
+                 kind=USUAL[act] if wish.kind == "usual" else wish.kind,
+                 ball_place=_lies(scene, wish, frame) if act == "kick" else None,
+                 model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
+                 library=session.library(folder, unit) if folder else None,
+                 build=preferences.for_build(folder) if folder else {}, digest=digest(scene, body, act))
 
 
 def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
@@ -258,9 +254,8 @@ def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) ->
         found = np.array([_resting(target).translation]) * metres
     below = found[:, 2].min()
     if below < 0.0:
-        raise InputError(
-            "target", f"{-below:.2f} m below the ground", "one on or above it, where balls get", "raise it"
-        )
+        raise InputError("target", f"{-below:.2f} m below the ground", "one on or above it, where balls get",
+                         "raise it")
     return found
 
 

@@ -101,13 +101,10 @@ def figures(result: "Result") -> list[str]:
     speed, level = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
     up = np.degrees(np.arctan2(velocity[2], level))
     limb = "Wrist" if result.order.act == "throw" else "Ankle"
-    lines = [
-        f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s",
-        f"Launch angle: {up:.0f}\N{DEGREE SIGN}",
-        f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm",
-        f"Flight to the target: {result.seconds:.2f} s",
-        f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm", f"Slowest that gets there: {thrown.slowest:.1f} m/s",
-    ]
+    lines = [f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s",
+             f"Launch angle: {up:.0f}\N{DEGREE SIGN}", f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm",
+             f"Flight to the target: {result.seconds:.2f} s", f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm",
+             f"Slowest that gets there: {thrown.slowest:.1f} m/s"]
     if np.isfinite(result.usual_jerk):
         lines.append(f"Seam jerk, of p99: {100.0 * result.jerk / result.usual_jerk:.0f} %")
     return lines
@@ -210,6 +207,5 @@ def forget() -> None:
     _seen.update(job=None, begun={}, ended=set(), restored=False)
 
 
-WATCHER = Watcher(
-    name="Throws", matters=MATTERS, settle=settle, held_by=HELD_BY, restored=restored, loaded=forget, ends=forget,
-)
+WATCHER = Watcher(name="Throws", matters=MATTERS, settle=settle, held_by=HELD_BY, restored=restored, loaded=forget,
+                  ends=forget)
