@@ -9,6 +9,7 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
 from ..beyond_mocap.files.whole import beside, whole_folder
 from ..beyond_mocap.motion.motion import Motion
@@ -143,7 +144,7 @@ def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
     camera = bpy.data.objects.new("Camera", data)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    camera.rotation_euler = _towards(-np.array(CAMERA_FROM))
+    camera.rotation_euler = Vector(-np.array(CAMERA_FROM)).to_track_quat("-Z", "Y").to_euler()
     frames = whole_frames(float(scene.frame_start), motion.duration, frames_per_second(scene))
     seconds = (frames - scene.frame_start) / frames_per_second(scene)
     way = followed(motion.root_positions[:, :2], motion.fps)
@@ -162,9 +163,3 @@ def followed(places: np.ndarray, fps: float) -> np.ndarray:
     before, after = 2.0 * places[:1] - places[half:0:-1], 2.0 * places[-1:] - places[-2 : -half - 2 : -1]
     total = np.cumsum(np.concatenate([np.zeros((1, 2)), before, places, after]), axis=0)
     return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
-def _towards(way: np.ndarray):
-    from mathutils import Vector
-
-    return Vector(way).to_track_quat("-Z", "Y").to_euler()

@@ -16,6 +16,7 @@ from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
 from ..passes.hits_shown import motion_of
+from ..passes.possession import played_before, sample_property
 from ..passes.settings import KEPT
 from .settings import MARK
 
@@ -177,10 +178,8 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
     target = np.array(wish.target)
     target[2] = max(target[2], kind.radius)
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
-    ground = wish.way == "GROUND"
-    turns = (wish.back, wish.left)
-    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=turns, ground=ground,
-                 fastest=fastest, what=f"ball {name}")
+    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=(wish.back, wish.left),
+                 ground=wish.way == "GROUND", fastest=fastest, what=f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
@@ -230,7 +229,7 @@ def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> Non
     remember(ball, solved)
     aim.strike, aim.arrived = solved.strike, solved.strike + solved.shot.seconds * solved.fps
     aim.figures, aim.told = "\n".join(lines(solved)), ""
-    draw_curve(scene, ball, solved)
+    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
 
 
 def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None:
@@ -310,28 +309,13 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
 
 def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
-    before = ball.beyond_mocap_aim.before
-    slots = before.action.slots if before.action is not None else ()
-    slot = next((slot for slot in slots if slot.identifier == before.slot), None)
-    curves = channels.curves(before.action, slot) if slot is not None else {}
+    curves, _ = played_before(ball.beyond_mocap_aim.before)
     ends = channels.keyed_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None
     frames = np.arange(ends[0], strike, dtype=float)
-
-    def values(path: str, still: tuple) -> np.ndarray:
-        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
-                   for i, value in enumerate(still)]
-        return np.stack(columns, axis=1)
-
-    turns = values("rotation_quaternion", (1.0, 0.0, 0.0, 0.0))
-    return frames, values("location", (0.0, 0.0, 0.0)), quaternion.normalized(turns)
-
-
-def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
-    """The trajectory as a curve of its own, up to where the ball rests."""
-    aim = ball.beyond_mocap_aim
-    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
+    turns = sample_property(curves, "rotation_quaternion", frames, (1.0, 0.0, 0.0, 0.0))
+    return frames, sample_property(curves, "location", frames, (0.0, 0.0, 0.0)), quaternion.normalized(turns)
 
 
 def trajectory(
@@ -362,6 +346,14 @@ def trajectory(
     return path
 
 
+def remove_curve(path: bpy.types.Object) -> None:
+    """Take a curve object out of the file, and its curve with it where no other object has that."""
+    data = path.data
+    bpy.data.objects.remove(path)
+    if not data.users:
+        bpy.data.curves.remove(data)
+
+
 def lines(solved: Solved) -> list[str]:
     """A shot in lines "name: value"."""
     shot, aimed = solved.shot, solved.shot.aimed
@@ -386,12 +378,8 @@ def leave(ball: bpy.types.Object) -> None:
     linked.refuse(ball)
     channels.check_free(ball)
     aim = ball.beyond_mocap_aim
-    path = aim.curve
-    if path is not None and path.get(MARK):
-        data = path.data
-        bpy.data.objects.remove(path)
-        if not data.users:
-            bpy.data.curves.remove(data)
+    if aim.curve is not None and aim.curve.get(MARK):
+        remove_curve(aim.curve)
     if aim.before.kept:
         bring_back(aim.before, ball, MARK)
     for name in ("on", "body", "target", "curve", "told", "figures", "strike", "arrived"):

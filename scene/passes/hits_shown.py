@@ -10,9 +10,9 @@ import bpy
 import bpy.utils.previews
 import numpy as np
 
-from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels, linked
 from ..core.live import Watcher
+from ..path_editing.carrier import check_finite
 from ..path_editing.rigs import carrier_of, rides_as_rig
 from .settings import BeyondMocapHits, found_of, picture_name, pictures
 
@@ -52,8 +52,7 @@ def analyse(
 
     linked.refuse(body)
     motion, first = motion_of(scene, body)
-    if not np.isfinite(motion.root_positions).all() or not np.isfinite(motion.rotations).all():
-        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+    check_finite(body, motion)
     found = find(motion, part, side, threshold or None, bone or None)
     hits = body.beyond_mocap_hits
     hits.part, hits.side, hits.bone, hits.threshold = part, side or "right", bone, threshold

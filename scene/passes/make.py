@@ -19,6 +19,7 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, drop, put_aside
 from ..core.settings import absolute
 from ..path_editing import riders
+from ..path_editing.carrier import refuse_system_override
 from ..result import bake
 from ..rigs import armature
 from ..stage import ball, body
@@ -194,15 +195,10 @@ def figures(made: "Passes") -> list[str]:
 
 def _check(row: BeyondMocapPasser) -> None:
     """InputError where a player's body cannot be animated."""
-    target = row.body
-    if target is None:
-        return
-    linked.refuse(target)
-    channels.check_free(target)
-    override = target.override_library
-    if override is not None and override.is_system_override:
-        raise InputError(f"body {target.name}", "an override that cannot be edited", "an editable override",
-                         "make it editable: Outliner, Library Override, Make")
+    if row.body is not None:
+        linked.refuse(row.body)
+        channels.check_free(row.body)
+        refuse_system_override(row.body, "body")
 
 
 def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:

@@ -102,7 +102,9 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     linked.refuse(target)
     channels.check_free(target)
     possession.check_unaimed(target)
-    times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))
+    clock, (start, end) = of_scene(scene), (float(solved.times[0]), float(solved.times[-1]))
+    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    times = clock.start_time + (frames - clock.start_frame) / frames_per_second(scene)
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
     target[KEPT] = BALL  # under any name
 
@@ -167,7 +169,7 @@ def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
     """Why a touch becomes no key moment of a player; "" where it may. He has a timeline afterwards."""
     target = strips.with_lanes(context, player)
     clock = of_scene(context.scene)
-    first, last = (clock.seconds(frame) for frame in _ends(player))
+    first, last = (clock.seconds(frame) for frame in dots.keyed_frames(player.dot) or (-np.inf, np.inf))
     if not first <= touch.time <= last:
         return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
     near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
@@ -175,14 +177,3 @@ def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
         there = f"{player.name}: has a key moment at {near[0].key.time:.2f} s"
         return f"{there}, so none is added for the touch at {touch.time:.2f} s"
     return ""
-
-
-def _ends(player) -> tuple[float, float]:
-    return dots.keyed_frames(player.dot) or (-np.inf, np.inf)
-
-
-def _frames_between(scene, start: float, end: float) -> np.ndarray:
-    """The seconds of all whole scene frames from one second to another."""
-    clock, fps = of_scene(scene), frames_per_second(scene)
-    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
-    return clock.start_time + (frames - clock.start_frame) / fps

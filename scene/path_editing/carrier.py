@@ -54,6 +54,24 @@ def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object
     return before.action, next((slot for slot in slots if slot.identifier == before.slot), slots[0] if slots else None)
 
 
+def no_motion(body: bpy.types.Object) -> InputError:
+    """The error of an armature that plays nothing."""
+    return InputError(f"armature {body.name}", "it plays no action", "a motion", "import one, or choose an action")
+
+
+def check_finite(body: bpy.types.Object, motion: Motion) -> None:
+    """InputError where an armature's motion has a pose that is no number."""
+    if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
+        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+
+
+def refuse_system_override(body: bpy.types.Object, what: str = "armature") -> None:
+    """InputError where an object is a library override that cannot be edited."""
+    if body.override_library is not None and body.override_library.is_system_override:
+        raise InputError(f"{what} {body.name}", "an override that cannot be edited", "an editable override",
+                         "make it editable: Outliner, Library Override, Make")
+
+
 class Carrier(ABC):
     """One armature for the length of one event; nothing of Blender's is kept in it longer than that."""
 
@@ -73,10 +91,7 @@ class Carrier(ABC):
         """InputError where the armature cannot ride."""
         body = self.body
         linked.refuse(body)
-        override = body.override_library
-        if override is not None and override.is_system_override:
-            raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
-                             "make it editable: Outliner, Library Override, Make")
+        refuse_system_override(body)
         if body.mode == "EDIT":
             raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
                              "leave edit mode (Tab)")
@@ -143,8 +158,7 @@ class PlainCarrier(Carrier):
     def _original(self) -> tuple[bpy.types.Action, object]:
         found, slot = self.source()
         if found is None:
-            raise InputError(f"armature {self.body.name}", "it plays no action", "a motion",
-                             "import one, or choose an action")
+            raise no_motion(self.body)
         return found, slot
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
@@ -206,10 +220,10 @@ class PlainCarrier(Carrier):
             turns[:, 0] = quaternion.multiply(quaternion.inverse(lie.rotation), turns[:, 0])
         poses = quaternion.multiply(quaternion.multiply(quaternion.inverse(at_rest), turns), at_rest)
         shift = lie.to_armature(motion.root_positions) - np.array(bones[0].bone.head_local)
-        found = _columns(_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
+        found = keys.columns(_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
         for number, joint in enumerate(joints):
             mode = bones[joint].rotation_mode
-            found |= _columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
+            found |= keys.columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
         return found
 
 
@@ -264,10 +278,6 @@ def _path(bone: bpy.types.PoseBone, what: str) -> str:
     """The data path of a bone's location, or of its rotation in a mode."""
     name = {"location": "location", "QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
     return f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name.get(what, "rotation_euler")}'
-
-
-def _columns(path: str, values: np.ndarray) -> dict[keys.Place, np.ndarray]:
-    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
 
 
 def _changed(before: Motion, after: Motion) -> np.ndarray:

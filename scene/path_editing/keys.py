@@ -49,6 +49,11 @@ def places(curve: bpy.types.FCurve) -> np.ndarray:
     return values
 
 
+def columns(path: str, values: np.ndarray) -> dict[Place, np.ndarray]:
+    """Values (N, n) of a property, one channel each."""
+    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
+
+
 def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
     """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original come
     off."""
@@ -178,11 +183,8 @@ def _write(sheet: Sheet, place: Place, keys: np.ndarray, fresh: bool) -> None:
 def _curve(sheet: Sheet, place: Place) -> bpy.types.FCurve:
     if place not in sheet.curves:
         like = next((curve for (path, _), curve in sheet.sources.items() if path == place[0] and curve.group), None)
-        group = like.group.name if like is not None else _bone(place[0])
+        bone = place[0].split('"')[1] if place[0].startswith("pose.bones") else ""
+        group = like.group.name if like is not None else bone
         sheet.curves[place] = channels.new_curve(sheet.made, sheet.slot, *place, group)
     return sheet.curves[place]
 
-
-def _bone(path: str) -> str:
-    """The bone that a data path is about; empty where it is about none."""
-    return path.split('"')[1] if path.startswith("pose.bones") else ""

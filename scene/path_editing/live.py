@@ -11,6 +11,7 @@ so a thread works them out; they are kept as JSON with the rider.
 from __future__ import annotations
 
 import json
+from functools import partial
 from time import perf_counter
 
 import bpy
@@ -41,7 +42,7 @@ def follow(scene: bpy.types.Scene) -> int:
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:
             continue
         failed = f"{body.name}: the motion could not be worked out here"
-        count += bool(attempt(lambda: rides.renew(scene, body), lambda text: rides.tell(body, text), failed))
+        count += bool(attempt(lambda: rides.renew(scene, body), partial(rides.tell, body.beyond_mocap_ride), failed))
     return count
 
 

@@ -19,9 +19,7 @@ from .rigs import carrier_of
 from .settings import choose, riders, wishes
 
 _SAMPLES = 400
-MOST_FRAMES = 40_000
-"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take
-minutes."""
+MOST_FRAMES = 40_000  # of a cycled motion, about: worked out again while a path is dragged, more would take minutes
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,7 +103,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
         lines = _lines(scene, ridden_by, digest, _shown[body.session_uid][1])
-        _tell(ridden_by, lines, None)  # what was wrong meanwhile is so no more
+        tell(ridden_by, lines)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
@@ -117,7 +115,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     told = "\n".join((*drawn.notes, *curve.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
     now = Shown(first, fps, known.core, path=path, ridden=ridden, number=_counted, told=told)
     _shown[body.session_uid] = digest, now
-    _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
+    tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
     return True
 
 
@@ -136,13 +134,11 @@ def _check_length(known, path, settings) -> None:
     """InputError where a motion would have to be repeated for ever."""
     if not settings.cycle or known.arc.length <= 0.0:
         return
-    line = _along(path)
-    metres = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-    motion = known.motion
+    metres, motion = np.linalg.norm(np.diff(_along(path), axis=0), axis=1).sum(), known.motion
     frames = len(motion) * metres / known.arc.length / settings.speed
     if frames > MOST_FRAMES:
-        minutes = frames / motion.fps / 60.0
-        raise InputError("cycle", f"the motion would last {minutes:.0f} minutes on a path of {metres:.0f} m",
+        found = f"the motion would last {frames / motion.fps / 60.0:.0f} minutes on a path of {metres:.0f} m"
+        raise InputError("cycle", found,
                          f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
                          "shorten the path, or switch Cycle off")
 
@@ -331,13 +327,9 @@ def _figures(known, ridden) -> dict:
             "miss": round(float(ridden.miss.max(initial=0.0)), 4)}
 
 
-def tell(body: bpy.types.Object, line: str) -> None:
-    """Note for the panel why a rider could not follow."""
-    _tell(body.beyond_mocap_ride, line, None)
-
-
-def _tell(ride, lines: str, figures: dict | None) -> None:
-    """Write only what is new: each write is a change of the object, which is looked at again."""
+def tell(ride, lines: str, figures: dict | None = None) -> None:
+    """Note lines for the panel, such as why a rider could not follow, and figures. Only what is new is written: each
+    write is a change of the object, which is looked at again."""
     if ride.told != lines:
         ride.told = lines
     text = json.dumps(figures) if figures is not None else ride.figures

@@ -14,6 +14,8 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..rigs import control_study
 from ..rigs.control_study import CHANNELS
 from . import rig_look, rig_parts
+from .carrier import no_motion
+from .keys import columns
 from .rig_look import channel_of
 from .rig_ride import OBJECT, Carried, Rows, channel_values
 
@@ -78,9 +80,8 @@ class RigSource:
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
-            return (
-                table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
-            )
+            steps = np.array_equal(table, np.round(table))
+            return table[rows.low] if steps else rows.numbers((path, index, "is"), table)
         match = BONE.match(path)
         if match is None or match[2] not in CHANNELS or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
             return None
@@ -115,11 +116,6 @@ class RigSource:
         return columns("location", location) | columns(channel_of(mode), channel_values(mode, turned, table[0]))
 
 
-def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
-    """Values (N, n) of a property, one channel each."""
-    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
-
-
 class Played:
     """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object
     and its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches:
@@ -138,8 +134,7 @@ class Played:
             found |= own
             ends.append(extent or channels.keyed_range(own))
         if not found:
-            raise InputError(f"armature {rig.name}", "it plays no action", "a motion",
-                             "import one, or choose an action")
+            raise no_motion(rig)
         first = int(np.ceil(min(a for a, _ in ends) - 1e-4))
         last = int(np.floor(max(b for _, b in ends) + 1e-4))
         if any(_cycles(curve) for curve in found.values()):
@@ -188,8 +183,7 @@ def _is_posed(path: str) -> bool:
 
 def _resolves(rig: bpy.types.Object, path: str) -> bool:
     try:
-        value = rig.path_resolve(path)
-        rig_look._numbers(value)
+        rig_look.numbers_of(rig.path_resolve(path))
     except (ValueError, TypeError):
         return False
     return True

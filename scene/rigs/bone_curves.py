@@ -12,6 +12,7 @@ import numpy as np
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core.measure import units_per_metre
+from ..path_editing import keys
 from . import armature
 from .driven import Driven
 
@@ -28,9 +29,7 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
         back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
         world = quaternion.multiply(back[:, None], world)
         hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
-        root_turn, root_place = np.repeat(root_turn[:1], len(hips), axis=0), np.repeat(
-            root_place[:1], len(hips), axis=0
-        )
+        root_turn, root_place = (np.repeat(values[:1], len(hips), axis=0) for values in (root_turn, root_place))
     if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
         told.append("no root bone: the hips carry all of the motion; Export Motion can add one to a copy")
     lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)
@@ -134,17 +133,10 @@ def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.n
                 rotation = -rotation
             found[f"{path}.rotation_quaternion"] = (name, rotation)
         elif mode == "AXIS_ANGLE":
-            found[f"{path}.rotation_axis_angle"] = (name, _axis_angles(rotation))
+            found[f"{path}.rotation_axis_angle"] = (name, keys.rotation(mode, rotation))
         else:
             found[f"{path}.rotation_euler"] = (name, _euler_curves(rotation, mode))
     return found
-
-
-def _axis_angles(rotation: np.ndarray) -> np.ndarray:
-    """Angle and axis (F, 4) of sign-continuous rotations (F, 4)."""
-    length = np.linalg.norm(rotation[:, 1:], axis=1)
-    axis = np.where(length[:, None] > 1e-9, rotation[:, 1:] / np.maximum(length, 1e-9)[:, None], [0.0, 1.0, 0.0])
-    return np.column_stack([2.0 * np.arctan2(length, rotation[:, 0]), axis])
 
 
 def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
@@ -159,10 +151,7 @@ def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
         choices = [a - 2.0 * np.pi * np.round((a - last) / (2.0 * np.pi)) for a in (first, other)]
         last = min(choices, key=lambda a: np.abs(a - last).sum())
         out[frame] = last
-    found = np.empty_like(out)
-    for column, letter in enumerate(order):
-        found[:, "XYZ".index(letter)] = out[:, column]
-    return found
+    return out[:, [order.index(letter) for letter in "XYZ"]]
 
 
 def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion import quaternion
-from ..ball.shots import CLOSEST, trajectory
+from ..ball.shots import CLOSEST, remove_curve, trajectory
 from ..core import channels
 from ..core.measure import units_per_metre
 from ..core.set_aside import bring_back, drop, put_aside
@@ -88,10 +88,7 @@ def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     ball, path = wish.flown, wish.curve
     if ball is None or not flies_for(ball, body):
         if path is not None:
-            data = path.data
-            bpy.data.objects.remove(path)
-            if not data.users:
-                bpy.data.curves.remove(data)
+            remove_curve(path)
         if ball is not None:
             _brought_back(scene, ball, wish)
     drop(wish.ball_before, MARK)

@@ -20,6 +20,7 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import stance_of
 from ..core.settings import absolute
 from ..passes import possession
+from ..path_editing.carrier import check_finite, refuse_system_override
 from ..path_editing.rig_look import alone
 from ..rigs import armature
 from . import rigged
@@ -106,7 +107,7 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
                  place=place, facing=facing, targets=target_places(scene, wish, frame), at=frame / fps,
                  begins=scene.frame_start / fps, waits=waits, speed=wish.speed,
                  kind=USUAL[act] if wish.kind == "usual" else wish.kind,
-                 ball_place=_lies(scene, wish, frame) if act == "kick" else None,
+                 ball_place=place_at(scene, wish.ball, wish, frame) if act == "kick" and wish.ball else None,
                  model=absolute(model) if model else "", seed=wish.seed, folder=folder, unit=unit,
                  library=session.library(folder, unit) if folder else None,
                  build=preferences.for_build(folder) if folder else {}, digest=digest(scene, body, act))
@@ -117,10 +118,7 @@ def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     wish = body.beyond_mocap_throw
     linked.refuse(body, wish.ball)
     channels.check_free(body)
-    override = body.override_library
-    if override is not None and override.is_system_override:
-        raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
-                         "make it editable: Outliner, Library Override, Make")
+    refuse_system_override(body)
     if body.beyond_mocap_ride.on:
         raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not",
                          "press Keep or Leave first")
@@ -211,8 +209,7 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
     if ends is None:
         return None, scene.frame_start
     motion = action.read(body, scene, found, slot)
-    if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
-        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+    check_finite(body, motion)
     return motion, ends[0]
 
 
@@ -228,14 +225,6 @@ def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton"
     places, _ = pose_kinematics(skeleton, np.zeros(3), local)
     root = lie.to_world(np.array([body.data.bones[skeleton.names[0]].head_local]))[0]
     return np.asarray(root[:2]), float(heading_from_positions(skeleton, places))
-
-
-def _lies(scene: bpy.types.Scene, wish, frame: int) -> np.ndarray | None:
-    """(3,) m where the user's ball is as it is to be kicked."""
-    ball = wish.ball
-    if ball is None:
-        return None
-    return place_at(scene, ball, wish, frame)
 
 
 def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
