@@ -1,6 +1,5 @@
-"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, and a camera
-that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study
-lacked."""
+"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, a camera
+that keeps at the same distance (Faustino §5.1.1). His study lacked shadows and, where there is one, the ball."""
 
 from __future__ import annotations
 

@@ -144,8 +144,7 @@ def _refuse_hidden(ball: bpy.types.Object) -> None:
 
 
 def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
-    """(3,) units a second of the ball on a frame, by its keys on either side; by those before it where they end there,
-    or where it bounces behind it."""
+    """(3,) units a second of the ball on a frame, by its keys on either side; by those before where it bounces."""
     at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
     places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
     before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
@@ -155,8 +154,7 @@ def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
 
 
 def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
-    """Move the key before the handover so that its step there is the ball's velocity; (path, index, frame, old value)
-    each."""
+    """Move the key before the handover so that it steps as fast as the ball; (path, index, frame, old value) each."""
     kept = []
     for axis in range(3):
         curve = curves["location", axis]

@@ -53,8 +53,7 @@ def aimed(scene: bpy.types.Scene) -> list[bpy.types.Object]:
 
 
 def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The aimed ball that is meant: the active object, one that is selected, one whose target is active, or the only
-    one."""
+    """The aimed ball that is meant: active, selected, the one whose target is active, or the only one."""
     active = context.view_layer.objects.active
     balls = aimed(context.scene)
     meant = [ball for ball in balls if ball == active]
@@ -65,8 +64,7 @@ def aimed_ball(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def ball_meant(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The ball that is selected, by its mark or name; an aimed one that is active or whose target is; the only mesh
-    that is selected."""
+    """The ball that is selected, by mark or name; an aimed one that, or whose target, is active; the only mesh."""
     chosen = [thing for thing in context.selected_objects if thing.type == "MESH"]
     marked = [thing for thing in chosen if thing.beyond_mocap_aim.on or thing.get(KEPT) or "ball" in thing.name.lower()]
     if marked:

@@ -54,8 +54,7 @@ class Wish:
     follow: float = 3.0
 
     def key(self) -> tuple:
-        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits of a
-        number."""
+        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits."""
         values = (getattr(self, field.name) for field in fields(self))
         return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
 
@@ -165,8 +164,7 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
 
 
 def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
-    """Work the shot out, anew each time, so that undo finds the same one; `name` is told where that cannot be.
-    InputError as `shoot`."""
+    """Work the shot out, each time the same; `name` is told where that cannot be. InputError as `shoot`."""
     from ...beyond_mocap.ball.batch import courses
     from ...beyond_mocap.ball.flight import Launch, fly
     from ...beyond_mocap.ball.physics import BALLS, FASTEST
@@ -255,8 +253,7 @@ def check_ball(ball: bpy.types.Object | None) -> None:
 
 
 def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
-    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest; along X where it does
-    not."""
+    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest, or along X."""
     from ...beyond_mocap.ball.physics import FOOTBALL
 
     row = int(np.argmax(np.linalg.norm(strikes.velocity, axis=1)))
@@ -267,8 +264,7 @@ def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
 
 
 def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
-    """Scene frames of the ball stretch of the strike nearest to the current frame; the current frame where there is
-    none."""
+    """Scene frames of the ball stretch of the strike nearest to the current frame; that frame where there is none."""
     from ...beyond_mocap.passes.hits import analyse
 
     motion, first = motion_of(scene, body)

@@ -59,8 +59,7 @@ def create(
 
 
 def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
-    """Let a cloud play other trajectories, or the same ones mended, as fast as it did; what is known of a label stays
-    by name."""
+    """Let a cloud play other or cleaned trajectories, as fast as it did; what is known of a label stays by name."""
     linked.refuse(cloud, cloud.data)
     check(trial)
     if cloud.data.is_editmode:

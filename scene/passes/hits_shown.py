@@ -31,8 +31,7 @@ _EDGE, _BARS = 6, 44  # pixels round the curves, and of the bars at the foot
 
 
 def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
-    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError where it does not
-    move."""
+    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError if it is still."""
     if body.beyond_mocap_ride.on or (channels.playing(body)[0] is not None and not rides_as_rig(body)):
         return action.read(body, scene), action.first_frame(body)
     read = carrier_of(body).read(scene)
@@ -84,8 +83,7 @@ def summary(found: "Hits", first: int) -> dict:
 
 
 def lines(found: "Hits", first: int) -> list[str]:
-    """A line for each hit motion: the scene frame of its strike, a tab, its speed, and the frames between which a ball
-    can be hit."""
+    """A line for each hit motion: scene frame of its strike, a tab, its speed, and when a ball can be hit."""
     told = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)
@@ -116,8 +114,7 @@ def is_ours(marker: bpy.types.TimelineMarker) -> bool:
 
 
 def repaint() -> None:
-    """Paint the pictures of all armatures that have an analysis, where there is a window to show them: another file is
-    open, or something was undone."""
+    """Paint all analyses, where there is a window to show them: another file is open, or something was undone."""
     for thing in () if bpy.app.background else bpy.data.objects:
         if thing.type == "ARMATURE" and thing.beyond_mocap_hits.found:
             paint(thing.beyond_mocap_hits)

@@ -151,8 +151,7 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The
-    lists stay."""
+    """Take away what was made for the scene; bodies of the user's play their own motion again. The lists stay."""
     settings = scene.beyond_mocap_passes
     shown.check(*settings.players)
     if settings.rally is not None:

@@ -128,8 +128,7 @@ def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
 def own_way(
     scene: bpy.types.Scene, ball: bpy.types.Object, holds
 ) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
-    """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
-    where it has none."""
+    """Frames (F,), the ball's own place on each, and the first and last frame with a key of its own action, or None."""
     curves, stance = played_before(ball.beyond_mocap_ball.before)
     ends = channels.keyed_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
@@ -163,8 +162,7 @@ def sample_property(curves: dict, path: str, frames: np.ndarray, still) -> np.nd
 
 
 def check_unaimed(ball: bpy.types.Object) -> None:
-    """InputError for a ball that is aimed or that rigid bodies move: who carries it would not be seen, or its aim be
-    lost."""
+    """InputError for a ball that is aimed or moved by rigid bodies: a hold would not be seen, or the aim be lost."""
     aim = ball.beyond_mocap_aim
     if aim.handed:
         raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed",

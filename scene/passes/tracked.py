@@ -73,8 +73,7 @@ def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
 
 
 def together(named: tuple):
-    """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a
-    track."""
+    """The tracks of several players, (name, track) each, as one match at the first one's times; one stays a track."""
     from ...beyond_mocap.ball.tracked.solve import PITCH
     from ...beyond_mocap.files.tracking.tracking import Match, MatchPlayer
 
@@ -119,8 +118,7 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
 
 
 def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
-    """Make key moments of the ticked touches (of one player, or of all in the list of players); how many came of it,
-    and a line for each that did not."""
+    """Make key moments of the ticked touches (of one player, or of all); how many, and a line for each that failed."""
     settings, told, count = context.scene.beyond_mocap, [], 0
     found = {player.name: player for player in settings.players}
     for touch in context.scene.beyond_mocap_passes.touches:

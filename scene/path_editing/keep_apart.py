@@ -110,8 +110,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 
 
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
-    """Ask riders for these changes, instead of those before, and bring them up to date. InputError, and all as before,
-    where one of them cannot follow."""
+    """Ask riders for these changes and bring them up to date. InputError, and all as before, if one cannot follow."""
     from ...beyond_mocap.path_editing.follower import Change
 
     rides = [body.beyond_mocap_ride for body in bodies]

@@ -55,8 +55,7 @@ def columns(path: str, values: np.ndarray) -> dict[Place, np.ndarray]:
 
 
 def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
-    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original come
-    off."""
+    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original go."""
     for slot in [slot for slot in made.slots if slot.identifier != identifier]:
         made.slots.remove(slot)
     for name in [name for name in made.keys() if name.startswith("beyond_mocap")]:
@@ -146,8 +145,7 @@ def rotation(mode: str, pose: np.ndarray) -> np.ndarray:
 
 
 def _continuous(turns: np.ndarray) -> np.ndarray:
-    """Euler angles (N, 3) without jumps: each rotation has two sets of angles, (a, b, c) and (a + pi, pi - b, c +
-    pi)."""
+    """Euler angles (N, 3) without jumps: of each rotation (a, b, c) or (a + pi, pi - b, c + pi)."""
     other = np.stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi], axis=1)
     stay = np.abs(quaternion.wrapped(turns[1:] - turns[:-1])).sum(axis=1)
     swap = np.abs(quaternion.wrapped(other[1:] - turns[:-1])).sum(axis=1)

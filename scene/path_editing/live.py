@@ -35,8 +35,7 @@ _running: list[tuple[background.Job, int, int]] = []  # at most one, with the ar
 
 
 def follow(scene: bpy.types.Scene) -> int:
-    """Bring all live riders of a scene up to date; how many had to be. What cannot be is told at the rider, whose
-    motion stays as it was."""
+    """Bring all live riders of a scene up to date; how many had to be. Those that cannot follow are told why."""
     count = 0
     for body in riders(scene):
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:

@@ -267,8 +267,7 @@ def end(body: bpy.types.Object) -> None:
 
 
 def leave(*bodies: bpy.types.Object | None) -> list[str]:
-    """Riders among these play their originals again, because something else is to be done with them; a line for
-    each."""
+    """Riders among these play their originals again, for something else is to be done with them; a line for each."""
     riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
     for body in riding:
         may_end(body)
@@ -278,8 +277,7 @@ def leave(*bodies: bpy.types.Object | None) -> list[str]:
 
 
 def standing(body: bpy.types.Object | None):
-    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not
-    known."""
+    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where not known."""
     now = shown(body) if body is not None else None
     if now is None:
         return None

@@ -73,8 +73,7 @@ class RigSource:
         return self._rows
 
     def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
-        """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked
-        at."""
+        """A channel's values (N,) in the source on its frames that are shown; None where it was not looked at."""
         return rows.remembered((path, index), lambda: self._own(path, index, rows))
 
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:

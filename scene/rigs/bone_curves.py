@@ -18,8 +18,7 @@ from .driven import Driven
 
 
 def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
-    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that the driven bones are to have, and lines
-    told."""
+    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that driven bones are to have, and lines told."""
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
     told = []

@@ -49,8 +49,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What Blender shows of an armature: bones' poses (F, B, 4, 4) in its space, the object's (F, 4, 4) in the
-    world."""
+    """What Blender shows: bones' poses (F, B, 4, 4) in the armature's space, the object's (F, 4, 4) in the world."""
 
     bones: list[str]
     poses: np.ndarray
@@ -129,8 +128,7 @@ def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
 def _look(
     scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
 ) -> dict[str, _Shown]:
-    """What Blender shows of the armatures, and of things without bones, at scene frames (F,), whole or not; the frame
-    comes back."""
+    """What Blender shows of armatures and things without bones at scene frames (F,), whole or not."""
     now, subframe = scene.frame_current, scene.frame_subframe
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
     poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
@@ -404,8 +402,7 @@ def _save(stage, copies, wanted: Wanted) -> None:
 
 
 def with_ending(path: Path, ending: str) -> Path:
-    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its
-    ".v2")."""
+    """A path with this ending: in place of another form's, else added ("walk.v2" keeps its ".v2")."""
     if path.suffix.lower() in {ending, *SUFFIXES.values()}:
         return path.with_suffix(ending)
     return path.with_name(path.name + ending)

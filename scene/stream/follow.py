@@ -178,8 +178,7 @@ def _end() -> None:
 
 
 def start_listening(settings) -> Listener:
-    """Listen as the settings say. InputError where the port is taken or the suit's file is none; then nothing has
-    changed."""
+    """Listen as the settings say. InputError, and nothing changed, if the port is taken or the suit's file is none."""
     clip = bpy.path.abspath(settings.clip) if settings.clip else ""
     hierarchy = hierarchy_of(clip) if clip else None
     before = current_listener()

@@ -88,8 +88,7 @@ def digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> str:
 
 
 def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: int = 0) -> Order:
-    """What an armature's settings ask for, on `frame`, 0 as they say; InputError where that makes no sense, or where it
-    cannot be animated."""
+    """What an armature's settings ask for, on `frame`, 0 as they say; InputError where it cannot be animated so."""
     wish, common = body.beyond_mocap_throw, scene.beyond_mocap
     check(scene, body)
     fps, rig = frames_per_second(scene), rigged.rig_of(scene, body)
@@ -196,8 +195,7 @@ def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Objec
 
 
 def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
-    """What an armature plays without its throw, and the scene frame of its first pose; (None, first frame) where it
-    plays nothing."""
+    """What an armature plays without its throw, None where nothing, and the scene frame of its first pose."""
     before = body.beyond_mocap_throw.before
     if before.kept:
         found = before.action
@@ -228,8 +226,7 @@ def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton"
 
 
 def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
-    """(F, 3) m: where the target is on each frame from `frame` on; (1, 3) for one that stands. InputError below the
-    ground or in another scene."""
+    """(F, 3) m: the target on each frame from `frame` on, (1, 3) if it stands. InputError below ground or elsewhere."""
     target, metres = wish.target, 1.0 / units_per_metre(scene)
     if target is None:
         found = np.array([scene.cursor.location]) * metres

@@ -23,8 +23,7 @@ _own: dict[int, tuple["Motion | None", int]] = {}
 
 
 def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
-    """An armature whose bones do not simply play what they show, by its driven bones; None for plain ones. InputError
-    where it cannot be baked onto."""
+    """The driven bones of an armature that does not simply play its keys, else None. InputError if not bakeable."""
     wish = body.beyond_mocap_throw
     if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
         return None
@@ -33,8 +32,7 @@ def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
 
 
 def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
-    """What a rig shows without its throw, on a skeleton of its own, and the scene frame of its first pose; (None, first
-    frame) where it plays nothing."""
+    """What a rig shows without its throw, on its own skeleton, or None, and the scene frame of its first pose."""
     if body.beyond_mocap_throw.rigged:
         if body.session_uid not in _own:
             raise InputError(f"rig {body.name}", "it shows a throw of an earlier session", "its own motion",
@@ -67,8 +65,7 @@ def lift(rig: Driven) -> float:
 
 
 def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
-    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again.
-    Returns lines about it."""
+    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again. Returns lines about it."""
     source = Source(motion, start, name)
     fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]

@@ -1,5 +1,4 @@
-"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw. Saved with the file, known to
-undo."""
+"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw; saved with the file."""
 
 from __future__ import annotations
 

@@ -116,8 +116,7 @@ def _reset(wish) -> None:
 
 
 def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """An armature whose throw is another than what is asked for; the same wish is begun once, and not anew where undo
-    or redo has brought it back."""
+    """An armature whose throw is not as asked; each wish is begun once, also where undo or redo brings it back."""
     asked = {}
     for body in scene.objects:
         if body.type != "ARMATURE" or body.library is not None:
@@ -144,8 +143,7 @@ def begin(scene: bpy.types.Scene, body: bpy.types.Object) -> background.Job:
 
 
 def finish(scene: bpy.types.Scene, job: background.Job) -> None:
-    """Show what a thread has made, as a step of undo, where it is still asked for; BeyondMocapError where it cannot be
-    made."""
+    """Show a thread's result, as a step of undo, where it is still asked for. BeyondMocapError where there is none."""
     if background.cancelled(job):
         return
     if job.error is not None:
