@@ -18,6 +18,7 @@ from ..core.set_aside import bring_back, put_aside
 from ..passes.hits_shown import motion_of
 from ..passes.possession import played_before, sample_property
 from ..passes.settings import KEPT
+from ..path_editing.curve import remove_curve
 from .settings import MARK
 
 if TYPE_CHECKING:
@@ -340,14 +341,6 @@ def trajectory(
     line.points.foreach_set("co", points.ravel())
     path.data.update_tag()
     return path
-
-
-def remove_curve(path: bpy.types.Object) -> None:
-    """Take a curve object out of the file, and its curve with it where no other object has that."""
-    data = path.data
-    bpy.data.objects.remove(path)
-    if not data.users:
-        bpy.data.curves.remove(data)
 
 
 def lines(solved: Solved) -> list[str]:

@@ -20,6 +20,7 @@ OWN = "own"
 def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     """The marker set that a cloud's labels describe, with what its static trial and the set that was applied say of
     markers that the cloud itself lacks. InputError where no segment has a marker, or names are wrong."""
+    from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
     from ...beyond_mocap.markers.model.marker_set import MarkerSet
 
     kept = cloud.beyond_mocap_cloud
@@ -27,7 +28,7 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     if not any(segment for segment, *_ in told.values()):
         raise InputError(cloud.name, "no marker belongs to a segment", "some that do",
                          "load a marker set, or select markers in Edit Mode and press Assign")
-    before = _applied(cloud)
+    before = parse_marker_set(kept.set_text, cloud.name) if kept.set_text else None  # that was applied last
     if is_cloud(kept.static):
         told = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in kept.static.beyond_mocap_cloud.labels
                 if row.role not in ("BALL", "OTHER") and row.segment.strip()} | told  # fmt: skip
@@ -47,31 +48,17 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
                      other=tuple(label for label, row in told.items() if row[2] == "OTHER"))
 
 
-def _applied(cloud: bpy.types.Object) -> "MarkerSet | None":
-    """The marker set that was applied to a cloud last."""
-    from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
-
-    text = cloud.beyond_mocap_cloud.set_text
-    return parse_marker_set(text, cloud.name) if text else None
-
-
 def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
     """Segment, landmarks and role of every label of a set."""
-    marks = _marks(marker_set)
+    marks: dict[str, list[str]] = {}
+    for landmark, labels in marker_set.landmarks.items():
+        for label in labels:
+            marks.setdefault(label, []).append(landmark)
     labels = (*marker_set.labels, *marker_set.ball, *marker_set.other)
     return {
         label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
         for label in labels
     }  # fmt: skip
-
-
-def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
-    """Label -> the landmarks that it marks."""
-    marks = {}
-    for landmark, labels in marker_set.landmarks.items():
-        for label in labels:
-            marks.setdefault(label, []).append(landmark)
-    return marks
 
 
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
@@ -89,8 +76,7 @@ def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
             row.segment, row.landmark, row.role = rows.get(row.name, ("", "", "NEEDED"))
     nodes.draw_lines(cloud)
     kept.set_name, kept.set_text = marker_set.name, marker_set_text(marker_set)
-    there = {row.name for row in kept.labels}
-    missing = sorted(marker_set.needed - there)
+    missing = sorted(marker_set.needed - {row.name for row in kept.labels})
     return [f"{marker_set.name}: {', '.join(missing[:8])} missing in {cloud.name}"] if missing else []
 
 

@@ -148,6 +148,14 @@ def create(
     return made
 
 
+def remove_curve(drawn: bpy.types.Object) -> None:
+    """Take a curve object out of the file, and its curve with it where no other object has that."""
+    data = drawn.data
+    bpy.data.objects.remove(drawn)
+    if not data.users:
+        bpy.data.curves.remove(data)
+
+
 def is_animated(drawn: bpy.types.Object) -> bool:
     """Whether an object, a curve or the ground, goes elsewhere with the frame, by itself or with what it hangs on."""
     known, waiting = set(), [drawn]

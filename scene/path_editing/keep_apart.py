@@ -43,20 +43,14 @@ class Trial:
     settings: object
     ground: object
 
-    def ridden(self, change):
-        """The rider's motion with a `Change`; its feet do not matter here."""
+    def follower(self, change, may_change: bool = True):
+        """The rider with a `Change` as a body of the core; its feet do not matter here."""
+        from ...beyond_mocap.path_editing.follower import Follower
         from ...beyond_mocap.path_editing.ride import ride
 
         settings = replace(self.settings, delay=self.settings.delay + change.delay, detours=change.detours, plant=False)
-        return ride(self.known, self.path, settings, self.ground)
-
-    def follower(self, change, may_change: bool = True):
-        """The rider with a `Change` as a body of the core."""
-        from ...beyond_mocap.path_editing.follower import Follower
-
-        ridden = self.ridden(change)
-        fps = ridden.motion.fps
-        times = (self.first + np.arange(len(ridden.motion))) / fps
+        ridden = ride(self.known, self.path, settings, self.ground)
+        times = (self.first + np.arange(len(ridden.motion))) / ridden.motion.fps
         places = np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]])
         if not may_change:
             return Follower(name=self.name, times=times, places=places)

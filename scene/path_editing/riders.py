@@ -219,10 +219,8 @@ def new_curve(
         raise
     ridden = any(rider.beyond_mocap_ride.curve == before for rider in riders(scene))
     if before is not None and before.get(curve.MARK) and not ridden:
-        name, data = before.name, before.data
-        bpy.data.objects.remove(before)
-        if not data.users:
-            bpy.data.curves.remove(data)
+        name = before.name
+        curve.remove_curve(before)
         made.name = made.data.name = name
     return made
 

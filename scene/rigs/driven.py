@@ -123,7 +123,12 @@ class Driven:
 
 
 def upright_turn(heads: dict[str, np.ndarray]) -> np.ndarray:
-    """The turn (4,), by quarter turns, that lets a body stand along Z and face +X.
+    """The turn (4,) of `upright_axes`."""
+    return quaternion.from_matrix(upright_axes(heads))
+
+
+def upright_axes(heads: dict[str, np.ndarray]) -> np.ndarray:
+    """The turn (3, 3), by quarter turns, that lets a body stand along Z and face +X.
 
     heads: part -> its place (3,) at rest, in the armature's space; thighs and feet are needed.
     """
@@ -131,7 +136,7 @@ def upright_turn(heads: dict[str, np.ndarray]) -> np.ndarray:
     up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
     across = legs[0] - legs[1]
     left = nearest_axis(across - (across @ up) * up)
-    return quaternion.from_matrix(np.stack([np.cross(left, up), left, up]))
+    return np.stack([np.cross(left, up), left, up])
 
 
 def list_targets(rig: bpy.types.Object, table: dict[str, str], overrides: list[Override]) -> dict[str, str]:

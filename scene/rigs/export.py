@@ -16,13 +16,13 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.files.whole import beside
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.aside import scene_aside
 from ..core.measure import frames_per_second, units_per_metre
 from . import bone_maps
+from .driven import upright_axes
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
@@ -232,12 +232,9 @@ def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
     """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
     heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
     lie = np.array(rig.matrix_world.to_3x3())
-    hips = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"])
-    up = nearest_axis(hips - 0.5 * (heads["left foot"] + heads["right foot"]))
-    across = heads["left upper_leg"] - heads["right upper_leg"]
-    left = nearest_axis(across - (across @ up) * up)
-    size = np.cbrt(abs(np.linalg.det(lie)))
-    turn = np.stack([np.cross(left, up), left, up]) * size
+    axes = upright_axes(heads)
+    hips, up = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"]), axes[2]
+    turn = axes * np.cbrt(abs(np.linalg.det(lie)))
     out = np.eye(4)
     out[:3, :3] = turn
     out[:3, 3] = -turn @ (hips - (hips @ up) * up)

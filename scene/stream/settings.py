@@ -21,7 +21,7 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
         description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a "
         "player",
     )
-    body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
+    body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
                           description="The armature that does what the user does; made where it is missing")
 
 

@@ -12,13 +12,14 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.motion import quaternion
-from ..ball.shots import CLOSEST, remove_curve, trajectory
+from ..ball.shots import CLOSEST, trajectory
 from ..core import channels
 from ..core.measure import units_per_metre
 from ..core.set_aside import bring_back, drop, put_aside
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
+from ..path_editing.curve import remove_curve
 from ..result import bake
 from ..stage import ball as balls
 from .order import first_motion, flies_for, taken_from, way_before
