@@ -20,8 +20,7 @@ from ..core.measure import frames_per_second, units_per_metre
 
 GROUND = "Ball Ground"
 SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
-OURS = "beyond_mocap_physics"
-"""Custom property of what a handover has made."""
+OURS = "beyond_mocap_physics"  # custom property of what a handover has made
 ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
 CHOSEN = ("selected_objects", "selected_editable_objects")
 WORLD = ("substeps_per_frame", "solver_iterations")

@@ -76,11 +76,6 @@ class BeyondMocapMarkerEvent(bpy.types.PropertyGroup):
     seconds: FloatProperty(name="Time", description="Seconds on the recording's clock")
 
 
-def a_cloud(_own, thing) -> bool:
-    """Whether an object can be chosen as a trial."""
-    return is_cloud(thing)
-
-
 @with_settings("markers.cloud", update=shown)
 @with_settings("markers.model")
 class BeyondMocapCloud(bpy.types.PropertyGroup):
@@ -101,7 +96,7 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     set_text: StringProperty(name="Applied Set", options={"HIDDEN"},
                              description="The marker set that was applied last, as text")
     static: PointerProperty(
-        name="Static Trial", type=bpy.types.Object, poll=a_cloud,
+        name="Static Trial", type=bpy.types.Object, poll=lambda _, thing: is_cloud(thing),
         description="A recording of the same body standing still, from which its joints are found; none: from the "
         "motion itself",
     )

@@ -102,15 +102,11 @@ def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
 
 
 def unmark(played: bpy.types.Action) -> None:
-    """Take our markers off an action; others stay."""
-    for marker in [marker for marker in played.pose_markers if is_ours(marker)]:
-        played.pose_markers.remove(marker)
-
-
-def is_ours(marker: bpy.types.TimelineMarker) -> bool:
-    """Whether a hit analysis has set it, and nobody has renamed it since."""
-    record = marker.beyond_mocap
-    return record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER)
+    """Take the markers that a hit analysis has set off an action; others, and those renamed since, stay."""
+    for marker in list(played.pose_markers):
+        record = marker.beyond_mocap
+        if record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER):
+            played.pose_markers.remove(marker)
 
 
 def repaint() -> None:

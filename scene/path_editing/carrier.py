@@ -22,8 +22,7 @@ from ..core.set_aside import bring_back, put_aside
 from ..rigs import armature
 from . import keys
 
-MARK = "beyond_mocap_ride"
-"""Custom property of an action that a rider plays: a digest of what it was made of."""
+MARK = "beyond_mocap_ride"  # custom property of an action that a rider plays: a digest of what it was made of
 MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
 
 _sources: dict[int, Source] = {}  # by session_uid of the armature

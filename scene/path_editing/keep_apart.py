@@ -61,8 +61,7 @@ class Trial:
 @dataclass(frozen=True)
 class Kept:
     """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were;
-    changes: one `Change` a rider; left: lines about those that stay, and
-    about who was left out."""
+    changes: one `Change` a rider; left: lines about those that stay, and about who was left out."""
 
     bodies: tuple[str, ...]
     before: int
@@ -221,13 +220,9 @@ def _bodies(context) -> list[bpy.types.Object]:
     found = [body for body in scene.objects if body.type == "ARMATURE" and not body.beyond_mocap_ride.on]
     return [
         body for body in found
-        if _is_animated(body)
+        if (channels.playing(body)[0] is not None or playing_strips(body))
         and (body.name in players or body.visible_get(view_layer=layer) and not _hangs_on_rider(body))
     ]  # fmt: skip
-
-
-def _is_animated(body) -> bool:
-    return channels.playing(body)[0] is not None or bool(playing_strips(body))
 
 
 def _hangs_on_rider(body) -> bool:

@@ -81,11 +81,11 @@ class RigSource:
             table = table[:, min(index, table.shape[1] - 1)]
             steps = np.array_equal(table, np.round(table))
             return table[rows.low] if steps else rows.numbers((path, index, "is"), table)
-        match = BONE.match(path)
-        if match is None or match[2] not in CHANNELS or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
+        bone, channel = posed_bone(path), path.rpartition(".")[2]
+        if bone not in self.seen.bones:
             return None
-        table = self.seen.channels[match[2]][:, self.seen.number(bpy.utils.unescape_identifier(match[1]))]
-        if match[2] == "rotation_quaternion":
+        table = self.seen.channels[channel][:, self.seen.number(bone)]
+        if channel == "rotation_quaternion":
             table = quaternion.continuous(table)
         return rows.numbers((path, index, "is"), table[:, index])
 
@@ -145,12 +145,10 @@ class Played:
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)
         paths = {path for path, _ in found}
-        self.others = {path for path in paths if not _is_posed(path) and _resolves(rig, path)}
-        self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
+        self.others = {path for path in paths if posed_bone(path) is None and _resolves(rig, path)}
+        self.places = {place for place in found if posed_bone(place[0]) is not None or place[0] in self.others}
         self.switches = any(path not in _OBJECT for path in self.others)
-        self.bones = {
-            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in CHANNELS
-        }
+        self.bones = {bone for path in paths if (bone := posed_bone(path)) is not None}
         self.object_keyed = bool(_OBJECT & paths)
 
 
@@ -175,9 +173,10 @@ def _cycles(curve: bpy.types.FCurve) -> bool:
     return any(one.type == "CYCLES" and not one.mute for one in curve.modifiers)
 
 
-def _is_posed(path: str) -> bool:
+def posed_bone(path: str) -> str | None:
+    """The bone whose place, turn or size a data path is; None for other paths."""
     match = BONE.match(path)
-    return bool(match and match[2] in CHANNELS)
+    return bpy.utils.unescape_identifier(match[1]) if match and match[2] in CHANNELS else None
 
 
 def _resolves(rig: bpy.types.Object, path: str) -> bool:
@@ -211,10 +210,5 @@ def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Playe
 
 def _driven(rig: bpy.types.Object) -> set[str]:
     """Bones whose place or turn a driver sets."""
-    data = rig.animation_data
-    found = set()
-    for driver in data.drivers if data is not None else ():
-        match = BONE.match(driver.data_path)
-        if match and match[2] in CHANNELS and not driver.mute:
-            found.add(bpy.utils.unescape_identifier(match[1]))
-    return found
+    drivers = rig.animation_data.drivers if rig.animation_data is not None else ()
+    return {bone for one in drivers if not one.mute and (bone := posed_bone(one.data_path)) is not None}

@@ -66,7 +66,10 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
                 bone.parent = data.edit_bones[skeleton.names[skeleton.parents[joint]]]
     for bone in body.pose.bones:
         bone.rotation_mode = "QUATERNION"
-    data[PROPERTY] = json.dumps(_as_table(skeleton, units))
+    data[PROPERTY] = json.dumps({
+        "names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
+        "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units,
+    })
     if collection is not None and collection != scene.collection:
         collection.objects.link(body)
         scene.collection.objects.unlink(body)
@@ -147,11 +150,7 @@ def _tails(skeleton: Skeleton) -> np.ndarray:
         mean = onward.mean(axis=0) if len(onward) else np.zeros(3)
         if np.linalg.norm(mean) < 0.25 * STUB and len(onward):
             mean = max(onward, key=np.linalg.norm)
-        length = np.linalg.norm(mean)
-        if length < 1e-4:
-            mean, length = _incoming(skeleton, joint), 1.0
-            mean = mean * STUB
-        tails[joint] = mean
+        tails[joint] = mean if np.linalg.norm(mean) >= 1e-4 else STUB * _incoming(skeleton, joint)
     return tails
 
 
@@ -179,11 +178,6 @@ def _roll_target(tail: np.ndarray) -> Vector:
     """Where a bone's Z axis looks: forward along X, or up for bones that themselves point forward, as feet do."""
     forward = abs(tail[0]) > 0.7 * np.linalg.norm(tail)
     return Vector((0.0, 0.0, 1.0)) if forward else Vector((1.0, 0.0, 0.0))
-
-
-def _as_table(skeleton: Skeleton, units: float) -> dict:
-    return {"names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
-            "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units}
 
 
 def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:

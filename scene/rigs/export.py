@@ -30,8 +30,7 @@ _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"),
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
 ROOT_BONE = "root"
 _EVEN = 1e-4  # scale that is none
-HIDDEN = {"hide_viewport", "hide_render"}
-"""What is keyed on a mesh that is there for a part of the time only."""
+HIDDEN = {"hide_viewport", "hide_render"}  # what is keyed on a mesh that is there for a part of the time only
 
 
 @dataclass(frozen=True)

@@ -25,8 +25,7 @@ from .fit import BakeOptions, Fit, Slide, Source
 _OFF = 1e-3  # metres that are told
 MARK = "beyond_mocap_rig"
 BEFORE = "beyond_mocap_before"
-KEYS = "beyond_mocap_keys"
-"""Digest of the keys that were baked: with others somebody has worked on them."""
+KEYS = "beyond_mocap_keys"  # digest of the keys that were baked: with others somebody has worked on them
 
 
 @dataclass

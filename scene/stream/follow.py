@@ -31,8 +31,7 @@ from ..stage import body
 
 TICK, IDLE = 1.0 / 60.0, 0.25
 TOLD_EVERY, LOOKED_EVERY = 0.25, 0.1
-MOST_BODIES = 20
-"""Streamed bodies that a session makes: a sender that changes its skeleton again and again is stopped."""
+MOST_BODIES = 20  # streamed bodies that a session makes: a sender that changes its skeleton again and again is stopped
 
 MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)

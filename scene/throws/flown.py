@@ -28,8 +28,7 @@ from .settings import MARK, BeyondMocapThrow
 if TYPE_CHECKING:
     from .made import Result
 
-FAR = 0.3
-"""Metres from which on it is told that a ball jumps to the hand."""
+FAR = 0.3  # metres from which on it is told that a ball jumps to the hand
 NAMES = {"throw": "Thrown Ball", "kick": "Kicked Ball"}
 
 

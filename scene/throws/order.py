@@ -31,8 +31,7 @@ if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.motion.skeleton import Skeleton
 
-TARGET_SECONDS = 8.0
-"""Seconds from the release on in which a target's own way counts."""
+TARGET_SECONDS = 8.0  # seconds from the release on in which a target's own way counts
 _STILL = 1e-3  # m that a target moves by at most which stands
 
 

@@ -10,8 +10,7 @@ from ..result.result import BeyondMocapBefore
 
 USUAL = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}
-MARK = "beyond_mocap_thrown"
-"""Custom property of what a throw has made; no group has its name."""
+MARK = "beyond_mocap_thrown"  # custom property of what a throw has made; no group has its name
 
 
 @with_settings("throw", "throw.ball")

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from .made import Result
 
 MOST_LINES = 12
-BAKED = (BAKE_MARK, BEFORE, KEYS)
-"""What tells a bake that is taken away again."""
+BAKED = (BAKE_MARK, BEFORE, KEYS)  # what tells a bake that is taken away again
 RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
 
 HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
@@ -160,13 +159,6 @@ def finish(scene: bpy.types.Scene, job: background.Job) -> None:
         del _seen["begun"][body.name]
 
 
-def tell(scene: bpy.types.Scene, name: str, text: str) -> None:
-    """Say at an armature why its throw, which stays as it was, is not what is asked for."""
-    body = scene.objects.get(name)
-    if body is not None:
-        body.beyond_mocap_throw.told = text
-
-
 def settle(scene: bpy.types.Scene) -> bool:
     """Show what has come, begin what is due; whether something is made or has to wait."""
     active = bpy.context.view_layer.objects.active
@@ -185,13 +177,18 @@ def settle(scene: bpy.types.Scene) -> bool:
     body = due(scene)
     if body is not None:
         _try(scene, body.name, lambda: _seen.update(job=(body.name, scene.session_uid, begin(scene, body))))
-
-
     return body is not None
 
 
 def _try(scene: bpy.types.Scene, name: str, call) -> None:
-    attempt(call, lambda text: tell(scene, name, text), f"{name}: could not be made again here")
+    """Call it; where that fails, say at an armature why its throw, which stays as it was, is not what is asked for."""
+
+    def tell(text: str) -> None:
+        body = scene.objects.get(name)
+        if body is not None:
+            body.beyond_mocap_throw.told = text
+
+    attempt(call, tell, f"{name}: could not be made again here")
 
 
 def restored() -> None:
