@@ -51,12 +51,9 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
         _floor(scene, motion)
         _light(scene)
         _camera(scene, motion)
-        if look.movie:
-            with beside(path, path.suffix) as part:
-                _render(scene, str(part))
-        else:
-            with whole_folder(path) as part:
-                _render(scene, f"{part}/")
+        with beside(path, path.suffix) if look.movie else whole_folder(path) as part:
+            scene.render.filepath = str(part) if look.movie else f"{part}/"
+            bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 def engine_here(wanted: str) -> str:
@@ -90,11 +87,6 @@ def _settings(scene: bpy.types.Scene, look: Look) -> None:
     if look.movie:
         render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
     render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would tell files and times
-
-
-def _render(scene: bpy.types.Scene, path: str) -> None:
-    scene.render.filepath = path
-    bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 def _player(scene: bpy.types.Scene, motion: Motion) -> None:

@@ -23,7 +23,6 @@ SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
 OURS = "beyond_mocap_physics"  # custom property of what a handover has made
 ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
 CHOSEN = ("selected_objects", "selected_editable_objects")
-WORLD = ("substeps_per_frame", "solver_iterations")
 SPAN = ("frame_start", "frame_end")
 STRONGEST = 200.0  # of gravity's weight; Blender takes its number for units a second squared, whatever a unit is
 FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
@@ -80,7 +79,7 @@ def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
     """Let another ball that is handed over bring back what came before the first handover, after the last."""
     theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
     if not kept.get("others"):
-        theirs.update({name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False)
+        theirs.update({name: kept[name] for name in ("world", "gravity", *FINE, *SPAN) if name in kept}, others=False)
     theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
     heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
 
@@ -105,7 +104,7 @@ def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
         with bpy.context.temp_override(scene=scene):
             bpy.ops.rigidbody.world_remove()
     elif world is not None:
-        for name in WORLD:
+        for name in FINE:
             setattr(world, name, kept.get(name, getattr(world, name)))
         world.effector_weights.gravity = kept.get("gravity", world.effector_weights.gravity)
         for name in SPAN if not world.point_cache.is_baked else ():

@@ -55,10 +55,8 @@ def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
         for label in labels:
             marks.setdefault(label, []).append(landmark)
     labels = (*marker_set.labels, *marker_set.ball, *marker_set.other)
-    return {
-        label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
-        for label in labels
-    }  # fmt: skip
+    return {label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
+            for label in labels}
 
 
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:

@@ -71,10 +71,8 @@ def summary(found: "Hits", first: int) -> dict:
     the motion's first."""
     count = len(found.height)
     at = np.linspace(0, count - 1, min(count, _COLUMNS))
-    curves = {
-        name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
-        for name in ("height", "speed")
-    }
+    curves = {name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
+              for name in ("height", "speed")}
     return {"first": int(first), "count": count, "fps": round(float(found.fps), 4),
             "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
             "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),

@@ -97,7 +97,10 @@ def order_of(scene: bpy.types.Scene) -> Order:
                          "a folder of clips with strikes, such as sample_blend/passes/library",
                          "choose one under Choices, or in step 1")
     for row in settings.players:
-        _check(row)
+        if row.body is not None:
+            linked.refuse(row.body)
+            channels.check_free(row.body)
+            refuse_system_override(row.body, "body")
     shown.check(*settings.players)
     linked.refuse(settings.rally)
     if settings.rally is not None:
@@ -190,14 +193,6 @@ def figures(made: "Passes") -> list[str]:
             f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm",
             f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
             f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s"]
-
-
-def _check(row: BeyondMocapPasser) -> None:
-    """InputError where a player's body cannot be animated."""
-    if row.body is not None:
-        linked.refuse(row.body)
-        channels.check_free(row.body)
-        refuse_system_override(row.body, "body")
 
 
 def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:

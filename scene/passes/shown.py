@@ -67,7 +67,9 @@ def show_tool(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, c
     near = tool.length - tool.reach
     for start, end, radius in ((0.0, near, HANDLE * tool.radius), (near, tool.length, tool.radius)):
         if end > start:
-            _rod(shape, start, end, radius)
+            made = bmesh.ops.create_cone(shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius,
+                                         depth=end - start)
+            bmesh.ops.translate(shape, verts=made["verts"], vec=(0.0, 0.0, 0.5 * (start + end)))
     turn = Vector((0.0, 0.0, 1.0)).rotation_difference(along).to_matrix().to_4x4()
     shape.transform(Matrix.Translation(bone.head_local) @ turn @ Matrix.Scale(1.0 / metres, 4))
     shape.to_mesh(mesh)
@@ -88,10 +90,3 @@ def remove_tool(body: bpy.types.Object) -> None:
         bpy.data.objects.remove(child)
         if not mesh.users:
             bpy.data.meshes.remove(mesh)
-
-
-def _rod(shape: bmesh.types.BMesh, start: float, end: float, radius: float) -> None:
-    """A rod along Z, metres."""
-    made = bmesh.ops.create_cone(shape, cap_ends=True, segments=_SIDES, radius1=radius, radius2=radius,
-                                 depth=end - start)
-    bmesh.ops.translate(shape, verts=made["verts"], vec=(0.0, 0.0, 0.5 * (start + end)))

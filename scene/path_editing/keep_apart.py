@@ -218,11 +218,8 @@ def _bodies(context) -> list[bpy.types.Object]:
     scene, layer = context.scene, context.view_layer
     players = {player.body.name for player in scene.beyond_mocap.players if player.body is not None}
     found = [body for body in scene.objects if body.type == "ARMATURE" and not body.beyond_mocap_ride.on]
-    return [
-        body for body in found
-        if (channels.playing(body)[0] is not None or playing_strips(body))
-        and (body.name in players or body.visible_get(view_layer=layer) and not _hangs_on_rider(body))
-    ]  # fmt: skip
+    return [body for body in found if (channels.playing(body)[0] is not None or playing_strips(body))
+            and (body.name in players or body.visible_get(view_layer=layer) and not _hangs_on_rider(body))]
 
 
 def _hangs_on_rider(body) -> bool:

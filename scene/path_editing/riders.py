@@ -138,8 +138,7 @@ def _check_length(known, path, settings) -> None:
     frames = len(motion) * metres / known.arc.length / settings.speed
     if frames > MOST_FRAMES:
         found = f"the motion would last {frames / motion.fps / 60.0:.0f} minutes on a path of {metres:.0f} m"
-        raise InputError("cycle", found,
-                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
+        raise InputError("cycle", found, f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
                          "shorten the path, or switch Cycle off")
 
 

@@ -69,12 +69,9 @@ def _shown(rig: bpy.types.Object, control: str) -> str:
     if own.use_deform and not _FK_LIKE.search(control):
         return control
     near = _SAME * _size(rig)
-    fits = [
-        bone for bone in bones
-        if (bone.head_local - own.head_local).length < near and bone.name != control
-        and bone.vector.length and _direction(bone).dot(_direction(own)) > _ALONG
-        and (bone.use_deform or bone.name.startswith("ORG-"))
-    ]  # fmt: skip
+    fits = [bone for bone in bones if (bone.head_local - own.head_local).length < near and bone.name != control
+            and bone.vector.length and _direction(bone).dot(_direction(own)) > _ALONG
+            and (bone.use_deform or bone.name.startswith("ORG-"))]
     fits.sort(key=lambda bone: (not bone.name.startswith("ORG-"), len(bone.parent_recursive)))
     return fits[0].name if fits else control
 

@@ -56,7 +56,9 @@ class RigCarrier(Carrier):
         form = [frames_per_second(scene), units_per_metre(scene), [bone.rotation_mode for bone in body.pose.bones]]
         form += [[one.type, one.mute, getattr(one, "subtarget", ""), getattr(one, "target", None) and one.target.name]
                  for bone in body.pose.bones for one in bone.constraints]
-        thing = body if not self._object_keyed() else body.parent
+        original, slot = self.source()
+        found = channels.curves(original, slot) if slot is not None else {}
+        thing = body.parent if any(not path.startswith("pose.") for path, _ in found) else body
         while thing is not None:
             if thing is body or thing.animation_data is None:
                 form.append([thing.name, [list(row) for row in thing.matrix_basis]])
@@ -132,11 +134,6 @@ class RigCarrier(Carrier):
             return []
         return playing_strips(self.body, aside=self.ride.on)
 
-    def _object_keyed(self) -> bool:
-        original, slot = self.source()
-        found = channels.curves(original, slot) if slot is not None else {}
-        return any(not path.startswith("pose.") for path, _ in found)
-
     @contextmanager
     def _original(self):
         """The armature as it was before it rode, for the length of a `with`."""
@@ -156,8 +153,7 @@ class RigCarrier(Carrier):
             stand(body, json.loads(before.stance))
             yield
         finally:
-            data.action = mine[0]
-            data.action_slot = mine[1]
+            data.action, data.action_slot = mine[:2]
             data.use_nla, data.action_influence, data.action_blend_type, data.action_extrapolation = mine[2:]
             stand(body, now)
             body.update_tag(refresh={"OBJECT", "DATA", "TIME"})

@@ -7,6 +7,7 @@ bones point somewhere: `rest_rotations` is the difference, and the only thing `a
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -120,26 +121,22 @@ def rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray
     return quaternion.from_matrix(np.array([body.data.bones[name].matrix_local.to_3x3() for name in names]))
 
 
-class _editing:
+@contextmanager
+def _editing(context: bpy.types.Context, body: bpy.types.Object):
     """Edit mode on one armature for the length of a `with`; the active object and its mode come back afterwards."""
-
-    def __init__(self, context, body):
-        self.context, self.body = context, body
-
-    def __enter__(self):
-        objects = self.context.view_layer.objects
-        self.before = objects.active
-        self.mode = self.before.mode if self.before is not None else "OBJECT"
-        if self.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        objects.active = self.body
-        bpy.ops.object.mode_set(mode="EDIT")
-
-    def __exit__(self, *error):
+    before = context.view_layer.objects.active
+    mode = before.mode if before is not None else "OBJECT"
+    if mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-        self.context.view_layer.objects.active = self.before
-        if self.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode=self.mode)
+    context.view_layer.objects.active = body
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        yield
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        context.view_layer.objects.active = before
+        if mode != "OBJECT":
+            bpy.ops.object.mode_set(mode=mode)
 
 
 def _tails(skeleton: Skeleton) -> np.ndarray:

@@ -13,6 +13,7 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
 from ..core.measure import units_per_metre
 from ..path_editing import keys
+from ..path_editing.rig_look import channel_of
 from . import armature
 from .driven import Driven
 
@@ -128,13 +129,10 @@ def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.n
         if location is not None:
             found[f"{path}.location"] = (name, location)
         if mode == "QUATERNION":
-            if rotation[0, 0] < 0:
-                rotation = -rotation
-            found[f"{path}.rotation_quaternion"] = (name, rotation)
-        elif mode == "AXIS_ANGLE":
-            found[f"{path}.rotation_axis_angle"] = (name, keys.rotation(mode, rotation))
+            values = -rotation if rotation[0, 0] < 0 else rotation
         else:
-            found[f"{path}.rotation_euler"] = (name, _euler_curves(rotation, mode))
+            values = keys.rotation(mode, rotation) if mode == "AXIS_ANGLE" else _euler_curves(rotation, mode)
+        found[f"{path}.{channel_of(mode)}"] = (name, values)
     return found
 
 

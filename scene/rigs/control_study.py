@@ -76,9 +76,8 @@ class PosedRig:
         self._playing = (data.use_nla, data.action, data.action_slot) if data else None
         self._position = self.rig.data.pose_position
         self._modes = {name: bones[name].rotation_mode for name in self.controls}
-        self._values = {
-            (name, channel): tuple(getattr(bones[name], channel)) for name in self.controls for channel in CHANNELS
-        }
+        self._values = {(name, channel): tuple(getattr(bones[name], channel)) for name in self.controls
+                        for channel in CHANNELS}
 
     def _silence(self) -> None:
         if self._playing is not None:
@@ -231,9 +230,8 @@ def list_moving(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
 
 def _posed(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str]) -> PosedRig:
     """The rig without its animation but otherwise as it stands, limits off."""
-    limits = [
-        c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT") and not c.mute
-    ]
+    limits = [c for name in controls for c in rig.pose.bones[name].constraints if c.type.startswith("LIMIT")
+              and not c.mute]
     return PosedRig(rig, side.view_layers[0], controls, limits)
 
 

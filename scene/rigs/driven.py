@@ -146,7 +146,8 @@ def list_targets(rig: bpy.types.Object, table: dict[str, str], overrides: list[O
     """
     part_of, found = {bone: part for part, bone in table.items()}, {}
     for override in overrides:
-        constraint, part = _constraint(rig, override), part_of.get(override.bone, "")
+        constraint = rig.pose.bones[override.bone].constraints[override.constraint]
+        part = part_of.get(override.bone, "")
         if part.partition(" ")[2] in ("lower_leg", "lower_arm"):
             found |= dict(_goals(rig, constraint, part))
     found = dict(_named(rig)) | found
@@ -179,10 +180,6 @@ def list_followers(
                 found.setdefault(free, end)
     found |= {name: part for name, part in _named(rig) if part in shown}
     return {name: part for name, part in found.items() if name not in part_of}
-
-
-def _constraint(rig: bpy.types.Object, override: Override) -> bpy.types.Constraint:
-    return rig.pose.bones[override.bone].constraints[override.constraint]
 
 
 def _constraints(rig: bpy.types.Object) -> Iterator[tuple[bpy.types.PoseBone, bpy.types.Constraint]]:

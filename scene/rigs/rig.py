@@ -49,11 +49,6 @@ class BeyondMocapRigBone(bpy.types.PropertyGroup):
                          description="The bone, or control, that moves this part; empty where there is none")
 
 
-def is_armature(_settings, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as a rig."""
-    return candidate.type == "ARMATURE"
-
-
 def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
     """Map the bones of the chosen rig: the map kept for its skeleton, else by names and structure (always, if `again`).
 
@@ -97,10 +92,10 @@ def _chosen(settings, _context) -> None:
 class BeyondMocapRig(bpy.types.PropertyGroup):
     """Rig, map, baking, export."""
 
-    source: PointerProperty(name="Source", type=bpy.types.Object, poll=is_armature,
+    source: PointerProperty(name="Source", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
                             description="The armature whose motion is baked; empty takes the active player's body")
     target: PointerProperty(
-        name="Rig", type=bpy.types.Object, poll=is_armature, update=_chosen,
+        name="Rig", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE", update=_chosen,
         description="The rig that the motion is baked to: Rigify, Mixamo, Unreal, MetaHuman or any humanoid",
     )
     bones: CollectionProperty(type=BeyondMocapRigBone, description="Which bone of the rig is which part of the body")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +35,6 @@ class Result:
     library: "Library | None"
     jerk: float
     usual_jerk: float
-
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
@@ -118,36 +118,27 @@ def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", floa
 def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
     """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
     the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
-
     from ...beyond_mocap.throws.leave_path import is_in_reach, stopping_place
+    from ...beyond_mocap.throws.network_npz import read_model
+    from ...beyond_mocap.throws.throw import shipped_model
 
     def spot(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
-    model = _model(order)
+    model = read_model(order.model) if order.model else shipped_model(order.act)
+    throw = partial(_thrown_from, order, target, model, progress=progress, cancelled=cancelled)
     if order.ball_place is not None:
-        return _thrown_from(order, target, model, where={"ball_place": tuple(order.ball_place)}, progress=progress,
-                            cancelled=cancelled)
+        return throw(where={"ball_place": tuple(order.ball_place)})
     if order.own is None:
-        return _thrown_from(order, target, model, where={"start": tuple(order.place)}, progress=progress,
-                            cancelled=cancelled)
-    thrown = _thrown_from(order, target, model, where={"over": spot(order.at)}, progress=progress, cancelled=cancelled)
+        return throw(where={"start": tuple(order.place)})
+    thrown = throw(where={"over": spot(order.at)})
     motion, release = _shown(order, thrown, joined)
     begin = order.at - release
     if not joined:
-        return _thrown_from(order, target, model, where={"start": spot(begin)}, progress=progress, cancelled=cancelled)
+        return throw(where={"start": spot(begin)})
     if is_in_reach(own, start, motion, release, order.at):
         return thrown
-    return _thrown_from(order, target, model, where={"start": tuple(stopping_place(own, start, begin))},
-                        progress=progress, cancelled=cancelled)
-
-
-def _model(order: Order):
-    """The trained model that is asked for."""
-    from ...beyond_mocap.throws.network_npz import read_model
-    from ...beyond_mocap.throws.throw import shipped_model
-
-    return read_model(order.model) if order.model else shipped_model(order.act)
+    return throw(where={"start": tuple(stopping_place(own, start, begin))})
 
 
 def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
