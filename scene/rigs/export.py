@@ -20,15 +20,14 @@ from ...beyond_mocap.files.whole import beside
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.aside import scene_aside
-from ..core.measure import frames_per_second, units_per_metre
-from . import bone_maps
-from .driven import upright_axes
+from ..core.measure import frames_per_second
+from .bone_curves import ROOT_BONE, root_motion
+from .fit import evaluated, extent
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
-ROOT_BONE = "root"
 _EVEN = 1e-4  # scale that is none
 HIDDEN = {"hide_viewport", "hide_render"}  # what is keyed on a mesh that is there for a part of the time only
 
@@ -105,25 +104,6 @@ def check(format: str) -> None:
                          "choose another format, or switch the exporter's add-on on") from None
 
 
-def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
-    """First and last scene frame of what the armatures play; InputError where one plays nothing."""
-    ends = []
-    for rig in rigs:
-        data = rig.animation_data
-        own = []
-        playing, slot = channels.playing(rig)
-        if playing is not None:
-            found = channels.keyed_range(channels.curves(playing, slot))
-            own += [found] if found else []
-        own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
-                if not t.mute for s in t.strips if not s.mute]
-        if not own:
-            raise InputError(f"armature {rig.name}", "it does not move", "an action or NLA strips",
-                             "bake or accept a motion first")
-        ends += own
-    return min(a for a, _ in ends), max(b for _, b in ends)
-
-
 def _look(
     scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
 ) -> dict[str, _Shown]:
@@ -173,7 +153,7 @@ def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: 
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
     data.pose_position = "POSE"
-    hips, root, line, in_place = _root_motion(rig, shown, wanted, told)
+    hips, root, line, in_place = root_motion(rig, shown, wanted, told)
     kept = _kept(rig, wanted, root)
     poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in kept}
     if in_place is not None:
@@ -193,51 +173,6 @@ def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
         return every
     named = root or next((b.name for b in rig.data.bones if b.parent is None and b.name.lower() == ROOT_BONE), None)
     return deform | ({named} if named else set())
-
-
-def _root_motion(rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
-    """Hips, root bone (None: it has none), the root's way (F, 4, 4) and what brings everything back to where it began
-    (F, 4, 4); both None where they are not asked for."""
-    if wanted.root == "KEEP":
-        return None, None, None, None
-    from ...beyond_mocap.motion.path.root_path import ground_path
-
-    table = bone_maps.kept(rig) or bone_maps.suggest(rig)
-    at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
-    world = shown.lies[:, None] @ shown.poses[:, list(at.values())]
-    legs = world[:, :, :3, 3]
-    across = legs[:, 0] - legs[:, 1]
-    facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-    units = units_per_metre(bpy.context.scene)
-    place, yaw = ground_path(legs.mean(axis=1)[:, :2] / units, facing, frames_per_second(bpy.context.scene) if
-                             wanted.rate is None else wanted.rate,
-                             "straight" if wanted.root == "STRAIGHT" else "smooth")
-    way = np.tile(np.eye(4), (len(yaw), 1, 1))
-    way[:, :3, :3] = quaternion.to_matrix(quaternion.about_up(yaw))
-    way[:, :2, 3] = place * units
-    inward = np.linalg.inv(shown.lies)
-    own = table.get("root")
-    if wanted.root == "IN_PLACE":
-        return table["hips"], own, None, inward @ way[:1] @ np.linalg.inv(way) @ shown.lies
-    if own is not None:
-        rest = np.array(rig.data.bones[own].matrix_local)
-        upright = _standing(rig, table)
-        return table["hips"], own, inward @ way @ upright @ rest, None
-    told.append(f"{rig.name} has no root bone: one named {ROOT_BONE!r} was added to the copy in the file")
-    return table["hips"], None, inward @ way @ _standing(rig, table), None
-
-
-def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
-    """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
-    heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
-    lie = np.array(rig.matrix_world.to_3x3())
-    axes = upright_axes(heads)
-    hips, up = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"]), axes[2]
-    turn = axes * np.cbrt(abs(np.linalg.det(lie)))
-    out = np.eye(4)
-    out[:3, :3] = turn
-    out[:3, 3] = -turn @ (hips - (hips @ up) * up)
-    return out
 
 
 def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
@@ -418,7 +353,6 @@ def saved(out: Path, write_to) -> None:
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     from ...beyond_mocap.files.bvh import bvh
-    from .fit import evaluated
 
     frames = np.arange(stage.frame_end + 1)
     for copy in copies:

@@ -192,6 +192,25 @@ def _extent(body: bpy.types.Object, strips) -> tuple[int, int]:
     return int(np.ceil(min(a for a, _ in ends))), int(np.floor(max(b for _, b in ends)))
 
 
+def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
+    """First and last scene frame of what the armatures play; InputError where one plays nothing."""
+    ends = []
+    for rig in rigs:
+        data = rig.animation_data
+        own = []
+        playing, slot = channels.playing(rig)
+        if playing is not None:
+            found = channels.keyed_range(channels.curves(playing, slot))
+            own += [found] if found else []
+        own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
+                if not t.mute for s in t.strips if not s.mute]
+        if not own:
+            raise InputError(f"armature {rig.name}", "it does not move", "an action or NLA strips",
+                             "bake or accept a motion first")
+        ends += own
+    return min(a for a, _ in ends), max(b for _, b in ends)
+
+
 def evaluated(body: bpy.types.Object, scene: bpy.types.Scene, frames: np.ndarray) -> Motion:
     """The motion that Blender shows on an armature at these frames: NLA, constraints and all."""
     skeleton = armature.skeleton_of(body, scene)
