@@ -16,7 +16,7 @@ from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
 from ..passes.hits_shown import motion_of
-from ..passes.possession import played_before, sample_property
+from ..passes.possession import curves_before, sample_property
 from ..passes.settings import KEPT
 from ..path_editing.curve import remove_curve
 from .settings import MARK
@@ -306,7 +306,7 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
 
 def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
-    curves, _ = played_before(ball.beyond_mocap_aim.before)
+    curves = curves_before(ball.beyond_mocap_aim.before)
     ends = channels.keyed_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None

@@ -140,9 +140,14 @@ def own_way(
 
 def played_before(before: BeyondMocapBefore) -> tuple[dict, list]:
     """The curves of what a ball played before, and how it stood, as `set_aside.stance_of` has it."""
+    return curves_before(before), json.loads(before.stance)[""]
+
+
+def curves_before(before: BeyondMocapBefore) -> dict:
+    """The curves of what an object played before, by data path and index."""
     slots = before.action.slots if before.action is not None else ()
     slot = next((one for one in slots if one.identifier == before.slot), None)
-    return channels.curves(before.action, slot) if slot is not None else {}, json.loads(before.stance)[""]
+    return channels.curves(before.action, slot) if slot is not None else {}
 
 
 def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
