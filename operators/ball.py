@@ -11,8 +11,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.base.settings.aim import TIMES, WAYS
 from ..beyond_mocap.base.settings.setting import BALLS, HOLDS, PARTS, SIDES
 from ..scene.ball import handover, shots
-from ..scene.ball.settings import aimed, aimed_ball
-from ..scene.ball.subject import ball_meant, body_meant, stretch_of, target_meant
+from ..scene.ball.settings import aimed, aimed_ball, ball_meant, body_meant, target_meant
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
 from ..scene.core.settings import active_player
@@ -72,7 +71,7 @@ from where it lies"""
         if body is None:
             first = last = scene.frame_current
         elif self.found:
-            first, last = stretch_of(scene, body, self.part, self.side)
+            first, last = shots.stretch_of(scene, body, self.part, self.side)
         names = ("part", "side", "way", "bounces", "timing", "seconds", "arrival", "ball")
         own = {name: getattr(self, name) for name in names}
         place = shots.place_of(scene, ball) if ball is not None else (0.0, 0.0, 0.0)

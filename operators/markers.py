@@ -13,7 +13,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
 from ..scene.core import channels, window
 from ..scene.core.settings import as_setting
-from ..scene.markers import cloud, models, sets, solve, thrown
+from ..scene.markers import cloud, sets, solve
 from ..scene.markers.settings import cloud_meant, clouds, is_cloud
 from .verb import BackgroundVerb, DroppedIntoView, ImportVerb, Verb
 
@@ -236,7 +236,7 @@ class BEYOND_MOCAP_OT_load_marker_model(OnMarkers, ImportVerb, bpy.types.Operato
 
         path = self.chosen_one("one MODEL.json")
         thing = self.cloud(context)
-        models.onto(thing, read_model(path))
+        solve.keep_model(thing, read_model(path))
         thing.beyond_mocap_cloud.use_model = True
         self.report({"INFO"}, f"{thing.name}: model from {path.name}")
 
@@ -255,7 +255,7 @@ class BEYOND_MOCAP_OT_save_marker_model(OnMarkers, Verb, bpy.types.Operator, Exp
         from ..beyond_mocap.markers.files.model_json import write_model
 
         path = bpy.path.abspath(self.filepath)
-        write_model(models.of_cloud(cloud_meant(context)), path)
+        write_model(solve.model_of(cloud_meant(context)), path)
         self.report({"INFO"}, f"written to {path}")
 
 
@@ -339,7 +339,7 @@ the timeline"""
 
     def order(self, context):
         """The reconstruction, and what is known of the ball."""
-        return thrown.order_of(context.scene, self.cloud(context))
+        return solve.release_order(context.scene, self.cloud(context))
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
@@ -356,6 +356,6 @@ the timeline"""
             self.report({"WARNING"}, f"{name} is gone: nothing was written")
             return
         with self.within(scene):
-            thrown.show(bpy.context, thing, found)
-        for line in thrown.lines(found):
+            solve.show_release(bpy.context, thing, found)
+        for line in solve.release_lines(found):
             self.report({"INFO"}, f"{name}: {line}")

@@ -13,7 +13,7 @@ from ..beyond_mocap.files.whole import atomic_write
 from ..beyond_mocap.passes import scene_json
 from ..beyond_mocap.passes.sample_scenes import SAMPLES as SCENES
 from ..scene.core.measure import units_per_metre
-from ..scene.passes import examples, hits_shown, make, order, shown
+from ..scene.passes import hits_shown, make, order, shown
 from ..scene.passes.settings import SAMPLES
 from .verb import BackgroundVerb, ImportVerb, Verb
 
@@ -143,7 +143,7 @@ flight leaves one body at its strike and arrives at the next one at his"""
     def order(self, context):
         """What is to be made."""
         if not self.live:
-            examples.forget()
+            order.forget_examples()
         return make.order_of(context.scene)
 
     work = staticmethod(make.work)
@@ -225,6 +225,6 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
         """Work it out, then write."""
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
-        missing = examples.left_out(context.scene.beyond_mocap_passes)
+        missing = order.list_lost_examples(context.scene.beyond_mocap_passes)
         self.report({"WARNING" if missing else "INFO"},
                     ", ".join(filter(None, (f"written to {self.filepath}", missing))))

@@ -10,7 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
 from ..beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..scene.core import channels
 from ..scene.core.measure import units_per_metre
-from ..scene.path_editing import curve, keep_apart, measure, riders
+from ..scene.path_editing import curve, keep_apart, live, riders
 from ..scene.path_editing.settings import choose, meant
 from ..scene.path_editing.settings import riders as riders_in
 from .verb import NEEDS_NO_EDITING, Verb
@@ -113,7 +113,7 @@ class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
     def do(self, context):
         for body in meant(context):
             riders.renew(context.scene, body, anew=True)
-            measure.measure(context.scene, body)
+            live.measure(context.scene, body)
 
 
 class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):

@@ -16,10 +16,9 @@ from ..scene.core.measure import frames_per_second
 from ..scene.core.settings import active_player
 from ..scene.path_editing import riders
 from ..scene.result import bake
-from ..scene.rigs import bake_record, bone_maps, export, rig, rig_bake, rig_copy
+from ..scene.rigs import armature, bone_maps, export, rig, rig_bake
 from ..scene.rigs.driven import Driven, check
-from ..scene.rigs.fit import BakeOptions
-from ..scene.rigs.source import source_of
+from ..scene.rigs.fit import BakeOptions, source_of
 from .verb import ExportVerb, Verb
 
 
@@ -181,7 +180,7 @@ on the ground. What the rig played before is kept as an action"""
             Driven(target, table_for(settings.rig, target), context.scene)  # before anything is copied
         free = settings.rig.target if all(player.rig != settings.rig.target for player in players) else None
         for player in lacking:
-            player.rig = free or rig_copy.copied(settings.rig.target, f"{player.name} rig")
+            player.rig = free or armature.copy_rig(settings.rig.target, f"{player.name} rig")
             free = None
         context.view_layer.update()
         return [(player.body, player, player.rig, table_for(settings.rig, player.rig)) for player in players]
@@ -194,10 +193,10 @@ class BEYOND_MOCAP_OT_unbake(Verb, bpy.types.Operator):
     bl_label = "Remove Bake"
     needs = ("The chosen rig plays nothing that was baked here",
              lambda context: (target := context.scene.beyond_mocap.rig.target) is not None
-             and bool((channels.playing(target)[0] or {}).get(bake_record.MARK)))
+             and bool((channels.playing(target)[0] or {}).get(rig_bake.MARK)))
 
     def do(self, context):
-        bake_record.remove(context.scene.beyond_mocap.rig.target)
+        rig_bake.remove_bake(context.scene.beyond_mocap.rig.target)
 
 
 class BEYOND_MOCAP_OT_reduce_keys(Verb, bpy.types.Operator):

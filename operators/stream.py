@@ -9,7 +9,7 @@ from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.passes.stream.live_hits import recorded
 from ..scene.passes import make
 from ..scene.passes.settings import subject
-from ..scene.stream import follow, play, receiver, streamed
+from ..scene.stream import follow, play
 from .verb import BackgroundVerb, Verb
 
 
@@ -20,18 +20,20 @@ Nothing from other machines gets in, and nothing is sent"""
     bl_idname = "beyond_mocap.stream_start"
     bl_label = "Start Stream"
     bl_options = {"REGISTER"}
-    needs = "A stream is listened to already: press Stop Stream first", lambda context: receiver.listener() is None
+    needs = ("A stream is listened to already: press Stop Stream first",
+             lambda context: follow.current_listener() is None)
 
     def do(self, context):
         """Bind the port and begin to listen."""
-        receiver.start(context.scene.beyond_mocap_stream)
+        follow.start_listening(context.scene.beyond_mocap_stream)
         follow.began()
 
 
 class ListeningVerb(Verb):
     """A verb about the stream that is received."""
 
-    needs = "No stream is listened to: press Start Stream first", lambda context: receiver.listener() is not None
+    needs = ("No stream is listened to: press Start Stream first",
+             lambda context: follow.current_listener() is not None)
 
 
 class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
@@ -42,7 +44,7 @@ class BEYOND_MOCAP_OT_stream_stop(ListeningVerb, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     def do(self, context):
-        receiver.stop()
+        follow.stop_listening()
         follow.tell()
 
 
@@ -75,10 +77,10 @@ class BEYOND_MOCAP_OT_stream_keep(ListeningVerb, bpy.types.Operator):
 
     def do(self, context):
         """Read the ring, write an action."""
-        motion = recorded(receiver.listener(), self.seconds)
+        motion = recorded(follow.current_listener(), self.seconds)
         if motion is None:
             raise InputError("stream", "nothing has arrived yet", "frames", "start the sender")
-        streamed.keep(context, motion)
+        follow.keep_recording(context, motion)
 
 
 class BEYOND_MOCAP_OT_stream_play(BackgroundVerb, bpy.types.Operator):

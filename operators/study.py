@@ -14,7 +14,7 @@ from ..beyond_mocap.files.tables import read_ball
 from ..beyond_mocap.files.whole import beside
 from ..beyond_mocap.study.form import MOVIES, clip_source
 from ..beyond_mocap.study.order import read_study
-from ..scene.study import study as filming
+from ..scene import study as filming
 from .verb import Verb
 
 CLIPS = "clips"

@@ -6,7 +6,7 @@ A room for each feature, with what it does in its own docstring; docs/architectu
 
 from .core import registration, session
 from .core.live import start_watching, stop_watching
-from .markers import kept
+from .markers import solve
 from .match import child
 
 
@@ -27,4 +27,4 @@ def unregister():
     child.end_all()
     registration.unregister_package(__name__)
     session.clear()
-    kept.clear()
+    solve.forget_reconstructions()

@@ -20,11 +20,9 @@ from ..core.measure import frames_per_second, units_per_metre
 
 GROUND = "Ball Ground"
 SIZE, THICK = 300.0, 2.0  # metres of the slab that the ball lies on
-OURS = "beyond_mocap_physics"
-"""Custom property of what a handover has made."""
+OURS = "beyond_mocap_physics"  # custom property of what a handover has made
 ROLLS_OUT = 0.4  # angular damping, for Blender's balls would roll for ever
 CHOSEN = ("selected_objects", "selected_editable_objects")
-WORLD = ("substeps_per_frame", "solver_iterations")
 SPAN = ("frame_start", "frame_end")
 STRONGEST = 200.0  # of gravity's weight; Blender takes its number for units a second squared, whatever a unit is
 FINE = {"substeps_per_frame": 20, "solver_iterations": 20}
@@ -81,7 +79,7 @@ def _bequeath(heir: bpy.types.Object, kept: dict) -> None:
     """Let another ball that is handed over bring back what came before the first handover, after the last."""
     theirs = json.loads(heir.beyond_mocap_aim.handed_before or "{}")
     if not kept.get("others"):
-        theirs.update({name: kept[name] for name in ("world", "gravity", *WORLD, *SPAN) if name in kept}, others=False)
+        theirs.update({name: kept[name] for name in ("world", "gravity", *FINE, *SPAN) if name in kept}, others=False)
     theirs["solid"] = [*kept.get("solid", ()), *theirs.get("solid", ())]
     heir.beyond_mocap_aim.handed_before = json.dumps(theirs)
 
@@ -106,7 +104,7 @@ def _restore_world(scene: bpy.types.Scene, kept: dict) -> None:
         with bpy.context.temp_override(scene=scene):
             bpy.ops.rigidbody.world_remove()
     elif world is not None:
-        for name in WORLD:
+        for name in FINE:
             setattr(world, name, kept.get(name, getattr(world, name)))
         world.effector_weights.gravity = kept.get("gravity", world.effector_weights.gravity)
         for name in SPAN if not world.point_cache.is_baked else ():
@@ -144,8 +142,7 @@ def _refuse_hidden(ball: bpy.types.Object) -> None:
 
 
 def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
-    """(3,) units a second of the ball on a frame, by its keys on either side; by those before it where they end there,
-    or where it bounces behind it."""
+    """(3,) units a second of the ball on a frame, by its keys on either side; by those before where it bounces."""
     at = np.array([frame - 2, frame - 1, frame, frame + 1], float)
     places = np.stack([channels.sample(curves["location", axis], at) for axis in range(3)], axis=1)
     before, last = places[2] - places[1], 1.5 * places[2] - 2.0 * places[1] + 0.5 * places[0]
@@ -155,8 +152,7 @@ def _velocity(curves: dict, frame: int, fps: float) -> np.ndarray:
 
 
 def _shift(curves: dict, frame: int, velocity: np.ndarray, fps: float) -> list:
-    """Move the key before the handover so that its step there is the ball's velocity; (path, index, frame, old value)
-    each."""
+    """Move the key before the handover so that it steps as fast as the ball; (path, index, frame, old value) each."""
     kept = []
     for axis in range(3):
         curve = curves["location", axis]

@@ -71,6 +71,5 @@ def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
             WATCHER.mark()
 
 
-WATCHER = Watcher(
-    name="Aimed balls", changed=look_at, follow=follow, restored=shots.unsure, loaded=shots.forget, ends=shots.forget,
-)
+WATCHER = Watcher(name="Aimed balls", changed=look_at, follow=follow, restored=shots.unsure, loaded=shots.forget,
+                  ends=shots.forget)

@@ -16,7 +16,9 @@ from ..core.material import colour
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
 from ..passes.hits_shown import motion_of
+from ..passes.possession import curves_before, sample_property
 from ..passes.settings import KEPT
+from ..path_editing.curve import remove_curve
 from .settings import MARK
 
 if TYPE_CHECKING:
@@ -53,8 +55,7 @@ class Wish:
     follow: float = 3.0
 
     def key(self) -> tuple:
-        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits of a
-        number."""
+        """Plain values that tell two wishes apart, but for the body's motion; Blender keeps seven digits."""
         values = (getattr(self, field.name) for field in fields(self))
         return tuple(value.session_uid if isinstance(value, bpy.types.Object) else _rounded(value) for value in values)
 
@@ -164,8 +165,7 @@ def strikes_of(scene: bpy.types.Scene, wish: Wish) -> "Strikes":
 
 
 def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
-    """Work the shot out, anew each time, so that undo finds the same one; `name` is told where that cannot be.
-    InputError as `shoot`."""
+    """Work the shot out, each time the same; `name` is told where that cannot be. InputError as `shoot`."""
     from ...beyond_mocap.ball.batch import courses
     from ...beyond_mocap.ball.flight import Launch, fly
     from ...beyond_mocap.ball.physics import BALLS, FASTEST
@@ -177,10 +177,8 @@ def solve(scene: bpy.types.Scene, wish: Wish, name: str) -> Solved:
     target = np.array(wish.target)
     target[2] = max(target[2], kind.radius)
     fastest = FASTEST.get("foot" if wish.bone else wish.part, np.inf) if wish.human else np.inf
-    ground = wish.way == "GROUND"
-    turns = (wish.back, wish.left)
-    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=turns, ground=ground,
-                 fastest=fastest, what=f"ball {name}")
+    shot = shoot(strikes, target, kind, seconds=seconds, bounces=wish.bounces, turns=(wish.back, wish.left),
+                 ground=wish.way == "GROUND", fastest=fastest, what=f"ball {name}")
     spin = shot.aimed.spin[shot.chosen]
     flight = fly(Launch(0.0, shot.start, shot.velocity, spin), kind, shot.seconds + wish.follow)
     can = np.flatnonzero(shot.aimed.possible)
@@ -230,7 +228,7 @@ def write(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> Non
     remember(ball, solved)
     aim.strike, aim.arrived = solved.strike, solved.strike + solved.shot.seconds * solved.fps
     aim.figures, aim.told = "\n".join(lines(solved)), ""
-    draw_curve(scene, ball, solved)
+    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
 
 
 def set_up(ball: bpy.types.Object, wish: Wish, target: bpy.types.Object) -> None:
@@ -256,8 +254,7 @@ def check_ball(ball: bpy.types.Object | None) -> None:
 
 
 def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
-    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest; along X where it does
-    not."""
+    """A place (3,) m on the ground, `far` m off the way the part moves where it is fastest, or along X."""
     from ...beyond_mocap.ball.physics import FOOTBALL
 
     row = int(np.argmax(np.linalg.norm(strikes.velocity, axis=1)))
@@ -265,6 +262,20 @@ def ahead(strikes: "Strikes", far: float) -> tuple[float, float, float]:
     size = float(np.linalg.norm(level))
     x, y = strikes.start[row, :2] + far * (level / size if size > 0.1 else np.array([1.0, 0.0]))
     return float(x), float(y), FOOTBALL.radius
+
+
+def stretch_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> tuple[int, int]:
+    """Scene frames of the ball stretch of the strike nearest to the current frame; that frame where there is none."""
+    from ...beyond_mocap.passes.hits import analyse
+
+    motion, first = motion_of(scene, body)
+    now = min(max(scene.frame_current, first), first + len(motion) - 1)
+    motions = analyse(motion, part, side).motions
+    if not motions:
+        return now, now
+    nearest = min(motions, key=lambda one: abs(first + one.key - scene.frame_current))
+    low, high = nearest.ball_stretch
+    return int(first + low), int(first + high)
 
 
 def radius_of(wish: Wish) -> float:
@@ -295,28 +306,13 @@ def keys(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> tupl
 
 def _earlier(ball: bpy.types.Object, strike: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
     """What the ball did before it was aimed, up to the frame before the strike; None where it did nothing."""
-    before = ball.beyond_mocap_aim.before
-    slots = before.action.slots if before.action is not None else ()
-    slot = next((slot for slot in slots if slot.identifier == before.slot), None)
-    curves = channels.curves(before.action, slot) if slot is not None else {}
+    curves = curves_before(ball.beyond_mocap_aim.before)
     ends = channels.keyed_range(curves)
     if ends is None or ends[0] >= strike or ("location", 0) not in curves:
         return None
     frames = np.arange(ends[0], strike, dtype=float)
-
-    def values(path: str, still: tuple) -> np.ndarray:
-        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
-                   for i, value in enumerate(still)]
-        return np.stack(columns, axis=1)
-
-    turns = values("rotation_quaternion", (1.0, 0.0, 0.0, 0.0))
-    return frames, values("location", (0.0, 0.0, 0.0)), quaternion.normalized(turns)
-
-
-def draw_curve(scene: bpy.types.Scene, ball: bpy.types.Object, solved: Solved) -> None:
-    """The trajectory as a curve of its own, up to where the ball rests."""
-    aim = ball.beyond_mocap_aim
-    aim.curve = trajectory(scene, aim.curve, ball, solved.flight)
+    turns = sample_property(curves, "rotation_quaternion", frames, (1.0, 0.0, 0.0, 0.0))
+    return frames, sample_property(curves, "location", frames, (0.0, 0.0, 0.0)), quaternion.normalized(turns)
 
 
 def trajectory(
@@ -371,12 +367,8 @@ def leave(ball: bpy.types.Object) -> None:
     channels.check_local(ball)
     channels.check_free(ball)
     aim = ball.beyond_mocap_aim
-    path = aim.curve
-    if path is not None and path.get(MARK):
-        data = path.data
-        bpy.data.objects.remove(path)
-        if not data.users:
-            bpy.data.curves.remove(data)
+    if aim.curve is not None and aim.curve.get(MARK):
+        remove_curve(aim.curve)
     if aim.before.kept:
         bring_back(aim.before, ball, MARK)
     for name in ("on", "body", "target", "curve", "told", "figures", "strike", "arrived"):

@@ -1,4 +1,5 @@
-"""A trial as objects: a mesh with one vertex for each marker, played by `nodes`, and its trajectories beside it.
+"""A trial as objects: a mesh with one vertex for each marker, played by `nodes`, its trajectories beside it, and the
+labels drawn over it.
 
 The trajectories hang on the cloud alone, in no collection, so that nobody sees them and they go with it. A vertex knows
 its marker by an attribute, so that vertices can be deleted: those markers are then left out.
@@ -11,19 +12,24 @@ from typing import TYPE_CHECKING
 import bmesh
 import bpy
 import numpy as np
+from bpy_extras.view3d_utils import location_3d_to_region_2d
 from mathutils import Vector
 
 from ...beyond_mocap.base.errors import InputError
 from ..core import channels
+from ..core.live import Watcher
 from ..core.measure import frames_per_second, units_per_metre
 from ..result import bake
-from . import lines, nodes
+from . import nodes
 from .settings import is_cloud
 
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.trial import MarkerTrial
 
 RADIUS = 0.007  # metres of a marker's sphere
+
+LABEL_WIDTH = 32  # pixels of a label, at a scale of 1
+LABEL_HEIGHT, RGBA, FREE = 11, (1.0, 1.0, 1.0, 0.9), (1.0, 0.65, 0.1, 1.0)
 
 
 def create(
@@ -53,8 +59,7 @@ def create(
 
 
 def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene) -> None:
-    """Let a cloud play other trajectories, or the same ones mended, as fast as it did; what is known of a label stays
-    by name."""
+    """Let a cloud play other or cleaned trajectories, as fast as it did; what is known of a label stays by name."""
     channels.check_local(cloud, cloud.data)
     check(trial)
     if cloud.data.is_editmode:
@@ -82,10 +87,8 @@ def write(cloud: bpy.types.Object, trial: "MarkerTrial", scene: bpy.types.Scene)
         mesh = before.data
         bpy.data.objects.remove(before)
         bpy.data.meshes.remove(mesh)
-    cloud.data.attributes["position"].data.foreach_set(
-        "vector", places[0, markers(cloud)].astype(np.float32).ravel()
-    )
-    lines.draw(cloud)
+    cloud.data.attributes["position"].data.foreach_set("vector", places[0, markers(cloud)].astype(np.float32).ravel())
+    nodes.draw_lines(cloud)
 
 
 def read(cloud: bpy.types.Object, scene: bpy.types.Scene) -> "MarkerTrial":
@@ -211,7 +214,7 @@ def _relabel(cloud: bpy.types.Object, names: tuple[str, ...]) -> None:
     mesh.vertices.add(len(names))
     _attribute(mesh, nodes.MARKER, "INT", np.arange(len(names), dtype=np.int32))
     kept.labels.clear()
-    with lines.at_once():
+    with nodes.draw_later():
         for name in names:
             label = kept.labels.add()
             label.name = name
@@ -230,3 +233,38 @@ def _trajectories(name: str, places: np.ndarray, seen: np.ndarray) -> bpy.types.
 def _attribute(mesh: bpy.types.Mesh, name: str, kind: str, values: np.ndarray) -> None:
     found = mesh.attributes.get(name) or mesh.attributes.new(name, kind, "POINT")
     found.data.foreach_set("value", np.ascontiguousarray(values))
+
+
+def visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]]:
+    """What is written where: (place in the world, label, colour) of every marker that is seen now."""
+    thing = context.view_layer.objects.active
+    if not context.scene.beyond_mocap_markers.names or not is_cloud(thing) or not thing.visible_get():
+        return []
+    rows = thing.beyond_mocap_cloud.labels
+    found = []
+    for marker, place in places_at(thing, context.scene.frame_current_final):
+        if marker < len(rows):
+            colour = RGBA if rows[marker].segment or rows[marker].role in ("BALL", "OTHER") else FREE
+            found.append((thing.matrix_world @ place, rows[marker].name, colour))
+    return found
+
+
+def _draw_labels() -> None:
+    import blf
+
+    context = bpy.context
+    if context.space_data is None or not context.space_data.overlay.show_overlays:
+        return
+    scale, taken = context.preferences.system.ui_scale, set()
+    blf.size(0, LABEL_HEIGHT * scale)
+    for place, text, rgba in visible_labels(context):
+        at = location_3d_to_region_2d(context.region, context.region_data, place)
+        cell = at and (round(at.x / (LABEL_WIDTH * scale)), round(at.y / (LABEL_HEIGHT * scale)))
+        if cell and cell not in taken:  # one over the other cannot be read
+            taken.add(cell)
+            blf.color(0, *rgba)
+            blf.position(0, at.x + 6 * scale, at.y + 3 * scale, 0)
+            blf.draw(0, text)
+
+
+WATCHER = Watcher(name="Marker labels", draws=((bpy.types.SpaceView3D, _draw_labels, "POST_PIXEL"),))

@@ -1,4 +1,6 @@
-"""The node group that plays markers: each vertex of a cloud goes where the trajectories say at the scene's time.
+"""The node group that plays markers, and the lines between those of a segment: each vertex of a cloud goes where the
+trajectories say at the scene's time.
+
 
 The trajectories are a mesh of their own, sample after sample, in each as many vertices as the cloud has. It is Blender
 that samples them, so that a saved file plays without the extension. Where a marker is not seen, it has neither sphere
@@ -7,7 +9,11 @@ nor lines.
 
 from __future__ import annotations
 
+from contextlib import contextmanager
+
+import bmesh
 import bpy
+import numpy as np
 
 from ..core.material import colour
 
@@ -15,19 +21,19 @@ NAME = "Marker Cloud"
 SEEN, SIDE, MARKER = "seen", "side", "marker"
 """Attributes: of the trajectories, whether a sample was seen; of a cloud's vertices, a place in COLOURS, and which
 marker it is."""
-COLOURS = (
-    ("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
-    ("Marker without segment", (0.95, 0.55, 0.02)),
-)  # fmt: skip
-INPUTS = (
-    ("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
-    ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
-    ("Samples", "NodeSocketInt", 1, "How many samples there are"),
-    ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
-    ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
-    ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
-    ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"),
-)
+COLOURS = (("Marker", (0.80, 0.80, 0.80)), ("Marker left", (0.80, 0.05, 0.03)), ("Marker right", (0.03, 0.50, 0.08)),
+           ("Marker without segment", (0.95, 0.55, 0.02)))
+INPUTS = (("Trajectories", "NodeSocketObject", None, "The mesh of all samples"),
+          ("Markers", "NodeSocketInt", 1, "Vertices of a sample"),
+          ("Samples", "NodeSocketInt", 1, "How many samples there are"),
+          ("Start", "NodeSocketFloat", 1.0, "Scene frame of the first sample"),
+          ("Step", "NodeSocketFloat", 1.0, "Samples in a scene frame"),
+          ("Radius", "NodeSocketFloat", 0.007, "Of the spheres, in Blender units"),
+          ("Lines", "NodeSocketBool", True, "Draw lines between a segment's markers"))
+
+NEIGHBOURS = 3  # edges that each marker begins
+
+_waiting: list[bool] = []
 
 
 def group() -> bpy.types.NodeTree:
@@ -166,3 +172,60 @@ class _Builder:
         name, rgb = COLOURS[number]
         ball = self.out("GeometryNodeSetMaterial", ball, None, colour(name, rgb))
         return self.out("GeometryNodeInstanceOnPoints", points, self.logic("AND", shown, mine), ball)
+
+
+@contextmanager
+def draw_later():
+    """Lines wait: many labels are changed, and drawn at the end."""
+    _waiting.append(True)
+    try:
+        yield
+    finally:
+        _waiting.pop()
+
+
+def draw_lines(cloud: bpy.types.Object) -> None:
+    """Write edges and colours by the segments of the labels, in edit mode too; what is selected stays selected."""
+    mesh, labels = cloud.data, cloud.beyond_mocap_cloud.labels
+    if _waiting or cloud.library is not None or mesh.library is not None:
+        return
+    if not mesh.is_editmode and MARKER not in mesh.attributes:
+        return
+    shape = bmesh.from_edit_mesh(mesh) if mesh.is_editmode else bmesh.new()
+    if not mesh.is_editmode:
+        shape.from_mesh(mesh)
+    colours = shape.verts.layers.int.get(SIDE) or shape.verts.layers.int.new(SIDE)
+    which = shape.verts.layers.int[MARKER]
+    shape.verts.ensure_lookup_table()
+    segments = [labels[vertex[which]].segment if vertex[which] < len(labels) else "" for vertex in shape.verts]
+    for vertex, segment in zip(shape.verts, segments):
+        thing = vertex[which] < len(labels) and labels[vertex[which]].role in ("BALL", "OTHER")
+        vertex[colours] = 0 if thing else side(segment)
+    for edge in list(shape.edges):
+        shape.edges.remove(edge)
+    for one, other in edges(np.array([vertex.co for vertex in shape.verts]), segments):
+        shape.edges.new((shape.verts[one], shape.verts[other]))
+    if mesh.is_editmode:
+        bmesh.update_edit_mesh(mesh)
+    else:
+        shape.to_mesh(mesh)
+        shape.free()
+
+
+def edges(places: np.ndarray, segments: list[str]) -> list[tuple[int, int]]:
+    """Pairs of markers: each with its nearest of the same segment. places: (M, 3); segments: "" belongs to none."""
+    found = set()
+    for segment in sorted({name for name in segments if name}):
+        mine = np.flatnonzero([name == segment for name in segments])
+        apart = np.linalg.norm(places[mine, None] - places[None, mine], axis=-1)
+        for row, order in zip(mine, np.argsort(apart, axis=1, kind="stable")):
+            near = [mine[other] for other in order[: NEIGHBOURS + 1] if mine[other] != row]
+            found |= {(int(min(row, other)), int(max(row, other))) for other in near}
+    return sorted(found)
+
+
+def side(segment: str) -> int:
+    """Which of `nodes.COLOURS` a segment's markers have."""
+    if not segment:
+        return 3
+    return 1 if segment.startswith("Left") else 2 if segment.startswith("Right") else 0

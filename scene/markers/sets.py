@@ -8,7 +8,7 @@ import bmesh
 import bpy
 
 from ...beyond_mocap.base.errors import InputError
-from . import lines
+from . import nodes
 from .settings import is_cloud
 
 if TYPE_CHECKING:
@@ -20,16 +20,15 @@ OWN = "own"
 def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
     """The marker set that a cloud's labels describe, with what its static trial and the set that was applied say of
     markers that the cloud itself lacks. InputError where no segment has a marker, or names are wrong."""
+    from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
     from ...beyond_mocap.markers.model.marker_set import MarkerSet
 
     kept = cloud.beyond_mocap_cloud
     told = {row.name: (row.segment.strip(), row.landmark, row.role) for row in kept.labels}
     if not any(segment for segment, *_ in told.values()):
-        raise InputError(
-            cloud.name, "no marker belongs to a segment", "some that do",
-            "load a marker set, or select markers in Edit Mode and press Assign",
-        )
-    before = _applied(cloud)
+        raise InputError(cloud.name, "no marker belongs to a segment", "some that do",
+                         "load a marker set, or select markers in Edit Mode and press Assign")
+    before = parse_marker_set(kept.set_text, cloud.name) if kept.set_text else None  # that was applied last
     if is_cloud(kept.static):
         told = {row.name: (row.segment.strip(), row.landmark, "STATIC") for row in kept.static.beyond_mocap_cloud.labels
                 if row.role not in ("BALL", "OTHER") and row.segment.strip()} | told  # fmt: skip
@@ -42,40 +41,22 @@ def of_cloud(cloud: bpy.types.Object, name: str = "") -> "MarkerSet":
                 marked.setdefault(point, []).append(label)
     on_body = [label for labels in carried.values() for label in labels]
     having = {how: [label for label, row in told.items() if row[2] == how] for how in ("STATIC", "OPTIONAL")}
-    return MarkerSet(
-        name or kept.set_name or OWN, carried, marked, before.aliases if before is not None else {},
-        static=frozenset(having["STATIC"]) & frozenset(on_body),
-        optional=frozenset(having["OPTIONAL"]) & frozenset(on_body),
-        ball=tuple(label for label, row in told.items() if row[2] == "BALL"),
-        other=tuple(label for label, row in told.items() if row[2] == "OTHER"),
-    )
-
-
-def _applied(cloud: bpy.types.Object) -> "MarkerSet | None":
-    """The marker set that was applied to a cloud last."""
-    from ...beyond_mocap.markers.files.marker_set_text import parse_marker_set
-
-    text = cloud.beyond_mocap_cloud.set_text
-    return parse_marker_set(text, cloud.name) if text else None
+    return MarkerSet(name or kept.set_name or OWN, carried, marked, before.aliases if before is not None else {},
+                     static=frozenset(having["STATIC"]) & frozenset(on_body),
+                     optional=frozenset(having["OPTIONAL"]) & frozenset(on_body),
+                     ball=tuple(label for label, row in told.items() if row[2] == "BALL"),
+                     other=tuple(label for label, row in told.items() if row[2] == "OTHER"))
 
 
 def _rows_of(marker_set: "MarkerSet") -> dict[str, tuple[str, str, str]]:
     """Segment, landmarks and role of every label of a set."""
-    marks = _marks(marker_set)
-    labels = (*marker_set.labels, *marker_set.ball, *marker_set.other)
-    return {
-        label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
-        for label in labels
-    }  # fmt: skip
-
-
-def _marks(marker_set: "MarkerSet") -> dict[str, list[str]]:
-    """Label -> the landmarks that it marks."""
-    marks = {}
+    marks: dict[str, list[str]] = {}
     for landmark, labels in marker_set.landmarks.items():
         for label in labels:
             marks.setdefault(label, []).append(landmark)
-    return marks
+    labels = (*marker_set.labels, *marker_set.ball, *marker_set.other)
+    return {label: (marker_set.segment_of(label) or "", ", ".join(marks.get(label, ())), role(marker_set, label))
+            for label in labels}
 
 
 def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
@@ -87,23 +68,20 @@ def apply(cloud: bpy.types.Object, marker_set: "MarkerSet") -> list[str]:
     kept, rows = cloud.beyond_mocap_cloud, _rows_of(marker_set)
     trial = read(cloud, bpy.context.scene)
     names = dict(zip(trial.labels, named_as(trial, marker_set).labels))
-    with lines.at_once():
+    with nodes.draw_later():
         for row in kept.labels:
             row.name = names.get(row.name, row.name)
             row.segment, row.landmark, row.role = rows.get(row.name, ("", "", "NEEDED"))
-    lines.draw(cloud)
+    nodes.draw_lines(cloud)
     kept.set_name, kept.set_text = marker_set.name, marker_set_text(marker_set)
-    there = {row.name for row in kept.labels}
-    missing = sorted(marker_set.needed - there)
+    missing = sorted(marker_set.needed - {row.name for row in kept.labels})
     return [f"{marker_set.name}: {', '.join(missing[:8])} missing in {cloud.name}"] if missing else []
 
 
 def role(marker_set: "MarkerSet", label: str) -> str:
     """A label's role in a set."""
-    table = (
-        ("BALL", marker_set.ball), ("OTHER", marker_set.other), ("STATIC", marker_set.static),
-        ("OPTIONAL", marker_set.optional),
-    )  # fmt: skip
+    table = (("BALL", marker_set.ball), ("OTHER", marker_set.other), ("STATIC", marker_set.static),
+             ("OPTIONAL", marker_set.optional))
     return next((name for name, labels in table if label in labels), "NEEDED")
 
 
@@ -121,14 +99,14 @@ def assign(cloud: bpy.types.Object, names: list[str], segment: str) -> None:
 
     if segment and segment not in JOINTS:
         raise InputError("segment", f"{segment!r}", f"one of {', '.join(JOINTS)}")
-    with lines.at_once():
+    with nodes.draw_later():
         for row in cloud.beyond_mocap_cloud.labels:
             if row.name in names:
                 row.segment = segment
                 if row.role in ("BALL", "OTHER") and segment:
                     row.role = "NEEDED"
     cloud.beyond_mocap_cloud.set_name = OWN
-    lines.draw(cloud)
+    nodes.draw_lines(cloud)
 
 
 def chosen(cloud: bpy.types.Object) -> list[str]:

@@ -15,20 +15,18 @@ from bpy.props import (
 
 from ..core.properties import with_settings
 
-ROLES = (
-    ("NEEDED", "Needed", "It is in every recording of this marker set", "BLANK1", 0),
-    ("OPTIONAL", "Optional", "It may be missing", "CHECKBOX_DEHLT", 1),
-    ("STATIC", "Static Only", "It may be missing in all but the static trial", "ARMATURE_DATA", 2),
-    ("BALL", "Ball", "It is on a ball", "MESH_UVSPHERE", 3),
-    ("OTHER", "Other", "It is neither on the body nor on a ball", "CANCEL", 4),
-)
+ROLES = (("NEEDED", "Needed", "It is in every recording of this marker set", "BLANK1", 0),
+         ("OPTIONAL", "Optional", "It may be missing", "CHECKBOX_DEHLT", 1),
+         ("STATIC", "Static Only", "It may be missing in all but the static trial", "ARMATURE_DATA", 2),
+         ("BALL", "Ball", "It is on a ball", "MESH_UVSPHERE", 3),
+         ("OTHER", "Other", "It is neither on the body nor on a ball", "CANCEL", 4))
 
 
 def redraw(label, _context) -> None:
     """Draw lines and colours by the new segments."""
-    from . import lines
+    from . import nodes
 
-    lines.draw(label.id_data)
+    nodes.draw_lines(label.id_data)
 
 
 def shown(kept, _context) -> None:
@@ -59,16 +57,14 @@ class BeyondMocapMarker(bpy.types.PropertyGroup):
     """One marker of a cloud: its label, and what carries it."""
 
     name: StringProperty(name="Label", description="The marker's name")
-    segment: StringProperty(
-        name="Segment", update=redraw, search=segments, description="The segment of the body that carries it",
-    )
+    segment: StringProperty(name="Segment", update=redraw, search=segments,
+                            description="The segment of the body that carries it")
     landmark: StringProperty(
         name="Lies on", search=landmarks,
         description="The anatomical point that it lies on, by which joints are found; several with commas between",
     )
-    role: EnumProperty(
-        name="Role", items=ROLES, default="NEEDED", update=redraw, description="Whether it may be missing"
-    )
+    role: EnumProperty(name="Role", items=ROLES, default="NEEDED", update=redraw,
+                       description="Whether it may be missing")
     seen: FloatProperty(name="Seen", subtype="PERCENTAGE", max=100.0, description="Share of the samples with it")
 
 
@@ -78,11 +74,6 @@ class BeyondMocapMarkerEvent(bpy.types.PropertyGroup):
     name: StringProperty(name="Event", description="What happened")
     side: StringProperty(name="Side", description="Left, right, or neither")
     seconds: FloatProperty(name="Time", description="Seconds on the recording's clock")
-
-
-def a_cloud(_own, thing) -> bool:
-    """Whether an object can be chosen as a trial."""
-    return is_cloud(thing)
 
 
 @with_settings("markers.cloud", update=shown)
@@ -99,15 +90,13 @@ class BeyondMocapCloud(bpy.types.PropertyGroup):
     fps: FloatProperty(name="Rate", description="Samples a second")
     start: FloatProperty(name="Start", description="Seconds on the recording's clock at the first sample")
     subject: StringProperty(name="Subject", description="Who was recorded")
-    file: StringProperty(
-        name="File", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, description="The recording's file"
-    )
+    file: StringProperty(name="File", subtype="FILE_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"},
+                         description="The recording's file")
     set_name: StringProperty(name="Marker Set", description="The marker set that the labels belong to")
-    set_text: StringProperty(
-        name="Applied Set", options={"HIDDEN"}, description="The marker set that was applied last, as text"
-    )
+    set_text: StringProperty(name="Applied Set", options={"HIDDEN"},
+                             description="The marker set that was applied last, as text")
     static: PointerProperty(
-        name="Static Trial", type=bpy.types.Object, poll=a_cloud,
+        name="Static Trial", type=bpy.types.Object, poll=lambda _, thing: is_cloud(thing),
         description="A recording of the same body standing still, from which its joints are found; none: from the "
         "motion itself",
     )

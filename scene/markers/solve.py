@@ -1,7 +1,11 @@
-"""From a cloud to a body: what the recipe gets, and what its result becomes in the scene."""
+"""From a cloud to a body: what the recipe gets, and what its result becomes in the scene: the body, its model as a text
+of the file, and the ball that left the hand. Reconstructions are kept at the recording's own rate, which an action has
+not, as long as Blender runs, under names that a cloud keeps."""
 
 from __future__ import annotations
 
+import itertools
+import uuid
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,25 +15,33 @@ import numpy as np
 from mathutils import Matrix
 
 from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.motion import quaternion
 from ..core import action, channels
-from ..core.measure import frames_per_second
+from ..core.measure import frames_per_second, units_per_metre
 from ..core.properties import property_values
 from ..core.settings import absolute
 from ..result import bake
 from ..rigs import armature
+from ..stage import ball as balls
 from ..stage import body
 from . import cloud as clouds
-from . import kept as store
-from . import models, sets, thrown
+from . import sets
 from .settings import is_alone, is_cloud
 
 if TYPE_CHECKING:
     from ...beyond_mocap.markers.model.model import MarkerModel
     from ...beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings
+    from ...beyond_mocap.markers.release.release import Release, ReleaseSettings
     from ...beyond_mocap.markers.trial import MarkerTrial
+    from ...beyond_mocap.motion.motion import Motion
 
 MADE = "beyond_mocap_reconstructed"  # custom property of actions made here; no group has its name
+THROWN = "beyond_mocap_thrown"  # custom property of balls (their mesh's radius) and actions made here; no group's name
 SKIN = (0.55, 0.55, 0.60)
+MOST_KEPT = 30  # reconstructions
+_numbers = itertools.count(1)
+_session = uuid.uuid4().hex[:8]  # part of every name, so that none of another session is taken for one of this
+_made: dict[str, "Reconstruction"] = {}
 
 
 @dataclass(frozen=True)
@@ -53,11 +65,9 @@ def order_of(scene: bpy.types.Scene, cloud: bpy.types.Object) -> Order:
     clouds.played_rate(cloud, scene)
     static = _static_of(cloud, scene)
     words = tuple(chosen.words.split()) if chosen.add else ()
-    return Order(
-        cloud.name, trial, static and clouds.read(static, scene),
-        model=models.of_cloud(cloud) if kept.use_model else None, settings=settings_of(cloud, chosen, words),
-        add=clip_place(scene, cloud.name) if chosen.add else None, words=words,
-    )
+    return Order(cloud.name, trial, static and clouds.read(static, scene),
+                 model=model_of(cloud) if kept.use_model else None, settings=settings_of(cloud, chosen, words),
+                 add=clip_place(scene, cloud.name) if chosen.add else None, words=words)
 
 
 def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Object | None:
@@ -66,11 +76,8 @@ def _static_of(cloud: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Obj
     if kept.use_model or not is_cloud(kept.static) or kept.static == cloud:
         return None
     if scene.objects.get(kept.static.name) != kept.static:
-        found, step = (
-            f"its static trial {kept.static.name} is gone from the scene",
-            "choose another, or clear the field",
-        )
-        raise InputError(cloud.name, found, "a cloud that is there", step)
+        raise InputError(cloud.name, f"its static trial {kept.static.name} is gone from the scene",
+                         "a cloud that is there", "choose another, or clear the field")
     return kept.static
 
 
@@ -80,10 +87,9 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
 
     assigned = any(row.segment for row in cloud.beyond_mocap_cloud.labels)
     throw = any(word.startswith("throw") for word in words)
-    return ReconstructSettings(
-        marker_set=sets.of_cloud(cloud) if assigned else None, release="yes" if throw else "auto",
-        **property_values(ReconstructSettings, chosen, "markers"),
-    )
+    return ReconstructSettings(marker_set=sets.of_cloud(cloud) if assigned else None,
+                               release="yes" if throw else "auto",
+                               **property_values(ReconstructSettings, chosen, "markers"))
 
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:
@@ -113,11 +119,11 @@ def show(context: bpy.types.Context, cloud: bpy.types.Object, made: "Reconstruct
     action.write(thing, played, scene, clouds.start_frame(cloud), cloud.name, generated=True)[MADE] = True
     thing.matrix_world = cloud.matrix_world
     bake.lengthen(scene, clouds.start_frame(cloud) + played.duration * frames_per_second(scene))
-    kept.made, kept.figures, kept.told = store.keep(made), "\n".join(figures(made)), "\n".join(made.warnings)
-    models.onto(cloud, made.model)
+    kept.made, kept.figures, kept.told = keep_reconstruction(made), "\n".join(figures(made)), "\n".join(made.warnings)
+    keep_model(cloud, made.model)
     kept.release = ""
     if made.release is not None:
-        thrown.show(context, cloud, made.release)
+        show_release(context, cloud, made.release)
     return thing
 
 
@@ -150,3 +156,100 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
     throw = made.release is not None and any(word.startswith("throw") for word in order.words)
     key = made.release.time if throw else None
     return add_clip(order.add.parent, order.add.stem, made.on_floor(), order.words, key)
+
+
+def keep_model(cloud: bpy.types.Object, model: "MarkerModel") -> None:
+    """Keep a model with a cloud; a text that other clouds use too stays as it is."""
+    from ...beyond_mocap.markers.files.model_json import model_text
+
+    kept = cloud.beyond_mocap_cloud
+    if kept.model is None or kept.model.users > 1 or kept.model.library is not None:
+        kept.model = bpy.data.texts.new(f"{cloud.name} model")
+        kept.model.use_fake_user = False
+    kept.model.clear()
+    kept.model.write(model_text(model))
+
+
+def model_of(cloud: bpy.types.Object) -> "MarkerModel":
+    """The model of a cloud. InputError where there is none, or none that can be read."""
+    from ...beyond_mocap.markers.files.model_json import parse_model
+
+    text = cloud.beyond_mocap_cloud.model
+    if text is None:
+        raise InputError(cloud.name, "no model", "one", "press Reconstruct without Use Model, or load a model")
+    return parse_model(text.as_string(), text.name)
+
+
+def release_order(
+    scene: bpy.types.Scene, cloud: bpy.types.Object
+) -> tuple[str, "MarkerTrial", "Motion", "ReleaseSettings"]:
+    """What is asked of a cloud: its name, its markers as recorded, on the motion's floor, the motion, the settings.
+    InputError where its body has not been reconstructed in this session."""
+    from ...beyond_mocap.markers.release.release import ReleaseSettings
+
+    channels.check_local(cloud, cloud.data)
+    clouds.played_rate(cloud, scene)
+    kept, chosen = cloud.beyond_mocap_cloud, scene.beyond_mocap_markers
+    made = reconstruction_of(kept.made)
+    if made is None:
+        raise InputError(cloud.name, "not reconstructed in this session", "a body", "press Reconstruct first")
+    marked = [row.name for row in kept.labels if row.role == "BALL" and row.name in made.raw.labels]
+    hand = None if chosen.hand == "AUTO" else chosen.hand
+    asked = ReleaseSettings(marked[0] if marked else None, chosen.radius or None, hand, chosen.thrown)
+    trial = made.raw.with_positions(made.raw.positions - [0.0, 0.0, made.lowered])
+    return cloud.name, trial, made.motion, asked
+
+
+def show_release(context: bpy.types.Context, cloud: bpy.types.Object, found: "Release") -> bpy.types.Object:
+    """The ball on its way, the release on the timeline, and figures in the panel; returns the ball."""
+    scene, kept, thing = context.scene, cloud.beyond_mocap_cloud, cloud.beyond_mocap_cloud.ball
+    lost = thing is None or thing.library is not None or thing.name not in scene.objects
+    if lost or not is_alone(cloud, scene, "ball"):
+        room = cloud.users_collection[0] if cloud.users_collection else context.collection
+        thing = kept.ball = balls.create(context, f"{cloud.name} ball", room, found.radius)
+        thing[THROWN] = found.radius
+    elif thing.get(THROWN):
+        thing.scale = (found.radius / thing[THROWN],) * 3
+    channels.discard(thing, THROWN)
+    slowed = clouds.played_rate(cloud, scene) / kept.fps
+    world = kept.body.matrix_world if kept.body is not None else cloud.matrix_world
+    matrix, units = np.array(world), units_per_metre(scene)
+    places = found.path.positions @ matrix[:3, :3].T + matrix[:3, 3] / units
+    turned = quaternion.from_rotation_vector(np.maximum(found.path.times - found.time, 0.0)[:, None] * found.spin)
+    path = replace(found.path, times=found.path.times / slowed, positions=places, rotations=turned)
+    balls.write(thing, path, scene, clouds.start_frame(cloud))[THROWN] = True
+    name, frame = f"{cloud.name} release", clouds.start_frame(cloud) + found.time / slowed * frames_per_second(scene)
+    for older in [marker for marker in scene.timeline_markers if marker.name == name]:
+        scene.timeline_markers.remove(older)
+    scene.timeline_markers.new(name, frame=round(frame))
+    kept.release = "\n".join(release_lines(found))
+    return thing
+
+
+def release_lines(found: "Release") -> list[str]:
+    """Lines "name: value" for the panel."""
+    told = [f"Speed: {found.speed:.1f} ± {found.speed_sigma:.1f} m/s", f"That is: {3.6 * found.speed:.0f} km/h",
+            f"Released: {found.time:.3f} s ± {1000.0 * found.time_sigma:.0f} ms", f"Hand: {found.side}",
+            f"Told by: {found.how}"]
+    if found.radar is not None:
+        told.append(f"Radar: {found.radar:.1f} m/s, {100.0 * (found.speed / found.radar - 1.0):+.1f} %")
+    return [*told, *found.notes]
+
+
+def keep_reconstruction(made: "Reconstruction") -> str:
+    """Keep it; returns its name."""
+    name = f"markers-{_session}-{next(_numbers)}"
+    _made[name] = made
+    while len(_made) > MOST_KEPT:
+        _made.pop(next(iter(_made)))
+    return name
+
+
+def reconstruction_of(name: str) -> "Reconstruction | None":
+    """The one of that name; None where this session has not made it."""
+    return _made.get(name)
+
+
+def forget_reconstructions() -> None:
+    """Forget everything."""
+    _made.clear()

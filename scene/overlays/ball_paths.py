@@ -16,7 +16,7 @@ from mathutils import Matrix
 from ..ball import shots
 from ..ball.settings import aimed
 from ..core.measure import frames_per_second, units_per_metre
-from ..passes import rally
+from ..passes import make
 from . import colours, shapes
 from .prepare import Mesh, line_mesh, repeated_mesh, segments_mesh
 from .rides import Item
@@ -56,10 +56,10 @@ def shots_seen(scene: bpy.types.Scene) -> list["Solved"]:
     return [solved for solved in found if solved is not None]
 
 
-def rally_seen(scene: bpy.types.Scene) -> rally.Rally | None:
+def rally_seen(scene: bpy.types.Scene) -> make.Rally | None:
     """The rally of which anything is to be drawn."""
     view = scene.beyond_mocap.view
-    return rally.of(scene) if rally.anything() and view.show and view.shots else None
+    return make.rally_of(scene) if make.has_rallies() and view.show and view.shots else None
 
 
 def shot_meshes(solved: "Solved") -> list[Mesh]:
@@ -79,7 +79,7 @@ def shot_meshes(solved: "Solved") -> list[Mesh]:
     return found
 
 
-def rally_meshes(shown: rally.Rally) -> list[Mesh]:
+def rally_meshes(shown: make.Rally) -> list[Mesh]:
     """All flights, strikes and bounces of a passing scene."""
     lines = np.concatenate([shapes.along(way) for way in shown.ways])
     found = [repeated_mesh(lines, colours.GREY, THIN, 0.6)]
@@ -89,7 +89,7 @@ def rally_meshes(shown: rally.Rally) -> list[Mesh]:
     return found + _bounces(shown.bounces)
 
 
-def flight_meshes(shown: rally.Rally, now: int) -> list[Mesh]:
+def flight_meshes(shown: make.Rally, now: int) -> list[Mesh]:
     """One flight of a passing scene, and those that its strike could have given."""
     found, strike = [], int(np.searchsorted(shown.strike_times, shown.starts[now] + 1e-6)) - 1
     if strike >= 0 and shown.candidates[strike].size:

@@ -1,5 +1,5 @@
-"""Hit analysis of an armature: what the core finds in its motion, kept for the panel and set as markers on its
-action."""
+"""Hit analysis of an armature: what the core finds in its motion, kept for the panel, set as markers on its action, and
+painted as a small picture of its curves (Ball handling Fig. 2)."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import json
 from typing import TYPE_CHECKING
 
 import bpy
+import bpy.utils.previews
 import numpy as np
 
-from ...beyond_mocap.base.errors import InputError
 from ..core import action, channels
 from ..core.live import Watcher
+from ..path_editing.carrier import check_finite
 from ..path_editing.rigs import carrier_of, rides_as_rig
-from . import graph
+from .settings import BeyondMocapHits, found_of, picture_name, pictures
 
 if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
@@ -21,11 +22,16 @@ if TYPE_CHECKING:
 
 MARKER = "hit"  # the names of our markers begin with it
 _COLUMNS = 480
+SIZE = 480  # pixels of the picture's width and height
+_GROUND, _GRID = (0.09, 0.09, 0.10), (0.20, 0.20, 0.22)
+_HEIGHT, _SPEED = (0.95, 0.95, 0.95), (0.30, 0.80, 1.0)
+_HIGH, _FAST, _LEVEL = (0.95, 0.25, 0.22), (0.90, 0.30, 0.90), (0.60, 0.52, 0.20)
+_STRETCH, _MOTION = (0.95, 0.25, 0.22), (0.28, 0.45, 0.95)
+_EDGE, _BARS = 6, 44  # pixels round the curves, and of the bars at the foot
 
 
 def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
-    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError where it does not
-    move."""
+    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError if it is still."""
     if body.beyond_mocap_ride.on or (channels.playing(body)[0] is not None and not rides_as_rig(body)):
         return action.read(body, scene), action.first_frame(body)
     read = carrier_of(body).read(scene)
@@ -45,8 +51,7 @@ def analyse(
 
     channels.check_local(body)
     motion, first = motion_of(scene, body)
-    if not np.isfinite(motion.root_positions).all() or not np.isfinite(motion.rotations).all():
-        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+    check_finite(body, motion)
     found = find(motion, part, side, threshold or None, bone or None)
     hits = body.beyond_mocap_hits
     hits.part, hits.side, hits.bone, hits.threshold = part, side or "right", bone, threshold
@@ -57,7 +62,7 @@ def analyse(
         unmark(played)
         if markers:
             mark(played, found, first)
-    graph.paint(hits)
+    paint(hits)
     return found
 
 
@@ -66,22 +71,17 @@ def summary(found: "Hits", first: int) -> dict:
     the motion's first."""
     count = len(found.height)
     at = np.linspace(0, count - 1, min(count, _COLUMNS))
-    curves = {
-        name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
-        for name in ("height", "speed")
-    }
-    return {
-        "first": int(first), "count": count, "fps": round(float(found.fps), 4),
-        "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
-        "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),
-        "links": _pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
-        "keys": [int(one.key) for one in found.motions],
-    }
+    curves = {name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
+              for name in ("height", "speed")}
+    return {"first": int(first), "count": count, "fps": round(float(found.fps), 4),
+            "threshold": round(float(found.threshold), 4), **curves, "highs": [int(frame) for frame in found.highs],
+            "fasts": [int(frame) for frame in found.fasts], "stretches": _pairs(found.ball_stretches),
+            "links": _pairs(found.links), "motions": [[int(one.first), int(one.last)] for one in found.motions],
+            "keys": [int(one.key) for one in found.motions]}
 
 
 def lines(found: "Hits", first: int) -> list[str]:
-    """A line for each hit motion: the scene frame of its strike, a tab, its speed, and the frames between which a ball
-    can be hit."""
+    """A line for each hit motion: scene frame of its strike, a tab, its speed, and when a ball can be hit."""
     told = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)
@@ -100,27 +100,93 @@ def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
 
 
 def unmark(played: bpy.types.Action) -> None:
-    """Take our markers off an action; others stay."""
-    for marker in [marker for marker in played.pose_markers if is_ours(marker)]:
-        played.pose_markers.remove(marker)
-
-
-def is_ours(marker: bpy.types.TimelineMarker) -> bool:
-    """Whether a hit analysis has set it, and nobody has renamed it since."""
-    record = marker.beyond_mocap
-    return record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER)
+    """Take the markers that a hit analysis has set off an action; others, and those renamed since, stay."""
+    for marker in list(played.pose_markers):
+        record = marker.beyond_mocap
+        if record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER):
+            played.pose_markers.remove(marker)
 
 
 def repaint() -> None:
-    """Paint the pictures of all armatures that have an analysis, where there is a window to show them: another file is
-    open, or something was undone."""
+    """Paint all analyses, where there is a window to show them: another file is open, or something was undone."""
     for thing in () if bpy.app.background else bpy.data.objects:
         if thing.type == "ARMATURE" and thing.beyond_mocap_hits.found:
-            graph.paint(thing.beyond_mocap_hits)
+            paint(thing.beyond_mocap_hits)
 
 
 def _pairs(stretches) -> list[list[int]]:
     return [[int(first), int(last)] for first, last in stretches]
 
 
-WATCHER = Watcher(name="Hit analysis", restored=repaint, loaded=repaint, ends=graph.forget)
+def paint(hits: BeyondMocapHits) -> None:
+    """Paint the picture of an analysis, where there is one and it is not painted yet."""
+    name = picture_name(hits)
+    if bpy.app.background or not hits.found:
+        return
+    if "graphs" not in pictures:
+        pictures["graphs"] = bpy.utils.previews.new()
+    if name in pictures["graphs"]:
+        return
+    pixels = picture(found_of(hits))
+    preview = pictures["graphs"].new(name)
+    preview.image_size = pixels.shape[1], pixels.shape[0]
+    preview.image_pixels_float = pixels.ravel().tolist()
+
+
+def picture(found: dict) -> np.ndarray:
+    """The picture (SIZE, SIZE, 4) float32, its lowest row first, of what `summary` says.
+
+    Above the height of the part, below its speed. Thin red lines stand where it is highest, magenta ones where it is
+    fastest, as in the paper; at the foot red bars are the stretches in which a ball can be hit, blue ones the hit
+    motions.
+    """
+    image = np.empty((SIZE, SIZE, 4), np.float32)
+    image[..., :3], image[..., 3] = _GROUND, 1.0
+    count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2
+    panes = ((middle + _EDGE, SIZE - _EDGE), (_BARS + _EDGE, middle - _EDGE))
+
+    def column(frame: float) -> int:
+        return int(round(_EDGE + frame / count * (SIZE - 1 - 2 * _EDGE)))
+
+    for second in np.arange(0.0, found["count"], found["fps"]):
+        image[_BARS:, column(second), :3] = _GRID
+    image[middle, :, :3] = _GRID
+    for first, last in found["motions"]:
+        image[6:16, column(first) : column(last) + 1, :3] = _MOTION
+    for first, last in found["stretches"]:
+        image[22:38, column(first) - 1 : column(last) + 2, :3] = _STRETCH
+    for (low, high), name, frames, colour, mark in (
+        (panes[0], "height", "highs", _HEIGHT, _HIGH), (panes[1], "speed", "fasts", _SPEED, _FAST)
+    ):
+        values = np.array(found[name])
+        top = max(float(values.max()), found["threshold"] if name == "height" else 0.0, 1e-6)
+        bottom = min(float(values.min()), 0.0)
+        for frame in found[frames]:
+            image[low:high, column(frame), :3] = mark
+        if name == "height":
+            level = int(low + (found["threshold"] - bottom) / (top - bottom) * (high - low - 1))
+            image[level, _EDGE : SIZE - _EDGE : 3, :3] = _LEVEL
+        _draw_curve(image, low + (values - bottom) / (top - bottom) * (high - low - 1), colour)
+    return image
+
+
+def forget_pictures() -> None:
+    """Take all pictures away."""
+    for kept in pictures.values():
+        bpy.utils.previews.remove(kept)
+    pictures.clear()
+
+
+def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
+    """A curve two pixels wide through heights (N,) px, spread over the picture's width."""
+    columns = np.arange(_EDGE, SIZE - _EDGE)
+    line = np.interp(columns, np.linspace(_EDGE, SIZE - 1 - _EDGE, len(heights)), heights)
+    before, after = np.r_[line[:1], line[:-1]], np.r_[line[1:], line[-1:]]
+    low = np.minimum(line, np.minimum(0.5 * (line + before), 0.5 * (line + after))) - 1.0
+    high = np.maximum(line, np.maximum(0.5 * (line + before), 0.5 * (line + after))) + 1.0
+    rows = np.arange(SIZE)[:, None]
+    cover = np.clip(np.minimum(rows + 0.5 - low, high - rows + 0.5), 0.0, 1.0)[..., None]
+    image[:, _EDGE : SIZE - _EDGE, :3] += cover * (np.array(colour) - image[:, _EDGE : SIZE - _EDGE, :3])
+
+
+WATCHER = Watcher(name="Hit analysis", restored=repaint, loaded=repaint, ends=forget_pictures)

@@ -13,7 +13,7 @@ import bpy
 from ...beyond_mocap.base.errors import BeyondMocapError
 from ..core import background, window
 from ..core.live import Watcher, is_playing
-from . import make, rally
+from . import make
 from .settings import PLAYED
 
 KIND = "flights"
@@ -50,7 +50,7 @@ def settle(scene: bpy.types.Scene) -> bool:
     _rest()
     digest = edited(scene)
     if not digest:
-        rally.show_dragged(None)
+        make.show_dragged(None)
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
         if bpy.ops.beyond_mocap.passes_make.poll():
@@ -71,7 +71,7 @@ def _drag(scene) -> None:
             return
         job = _running.pop()
         if job.result is not None:
-            rally.show_dragged(job.result)
+            make.show_dragged(job.result)
             window.redraw()
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
@@ -96,9 +96,8 @@ def forget() -> None:
     """Nothing is worked out or drawn any more."""
     _seen["begun"] = ""
     _rest()
-    rally.forget()
+    make.forget_rallies()
 
 
-WATCHER = Watcher(
-    name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=rally.forget, ends=forget,
-)
+WATCHER = Watcher(name="Passing scene", changed=look_at, settle=settle, dragged=_drag, loaded=make.forget_rallies,
+                  ends=forget)

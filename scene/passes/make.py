@@ -1,4 +1,5 @@
-"""A passing scene is made: written down on the main thread, worked out in any thread, laid on bodies and a ball."""
+"""A passing scene is made: written down on the main thread, worked out in any thread, laid on bodies and a ball. The
+overlays draw its flights: those that are shown, and while a place is dragged, those of where it is just now."""
 
 from __future__ import annotations
 
@@ -18,20 +19,28 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, drop, put_aside
 from ..core.settings import absolute
 from ..path_editing import riders
+from ..path_editing.carrier import refuse_system_override
 from ..result import bake
 from ..rigs import armature
 from ..stage import ball, body
-from . import held_tool, possession, rally, shown
 from . import order as asked
+from . import possession, shown
 from .settings import KEPT, BeyondMocapPasser
 
 if TYPE_CHECKING:
+    from ...beyond_mocap.ball.physics import Ball
     from ...beyond_mocap.library.library import Library
+    from ...beyond_mocap.passes.pass_plan import PassPlan
     from ...beyond_mocap.passes.passes import Passes
 
 BALL, NET = "Passing Ball", "Net"
 MESH = 0.1  # metres between two threads of the net
 MOST_LINES = 12
+WAY_STEP = 0.03  # s between two points of a way
+MOST_WAYS, MOST_RALLIES = 40, 20  # candidates of a strike, and scenes, that are kept
+
+_rallies: dict[str, "Rally"] = {}  # by the digest of what they were made of
+_dragged: list["Rally"] = []
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,13 +58,32 @@ class Order:
 
 
 @dataclass(frozen=True, eq=False)
+class Rally:
+    """Plain numbers, metres in the world. start: scene frame of second 0; starts (K,) s and ways, (n, 3) m each, of the
+    flights; strikes (S, 3) m and strike_times (S,) s; bounces (B, 3) m; candidates: (M, T, 3) m for each strike, from
+    which its way was chosen, empty for the last one."""
+
+    start: float
+    starts: np.ndarray
+    ways: tuple[np.ndarray, ...]
+    strike_times: np.ndarray
+    strikes: np.ndarray
+    bounces: np.ndarray
+    candidates: tuple[np.ndarray, ...]
+
+    def flight_at(self, seconds: float) -> int:
+        """The number of the flight in which the ball is."""
+        return int(np.clip(np.searchsorted(self.starts, seconds + 1e-9, side="right") - 1, 0, len(self.ways) - 1))
+
+
+@dataclass(frozen=True, eq=False)
 class Result:
     """What came of an order; rally: what is drawn of it."""
 
     order: Order
     library: "Library"
     passes: "Passes"
-    rally: rally.Rally
+    rally: Rally
 
 
 def order_of(scene: bpy.types.Scene) -> Order:
@@ -65,12 +93,14 @@ def order_of(scene: bpy.types.Scene) -> Order:
     chosen = settings.library_folder or common.library_folder
     folder = absolute(chosen)
     if not folder:
-        raise InputError(
-            "library", "no folder chosen", "a folder of clips with strikes, such as sample_blend/passes/library",
-            "choose one under Choices, or in step 1",
-        )
+        raise InputError("library", "no folder chosen",
+                         "a folder of clips with strikes, such as sample_blend/passes/library",
+                         "choose one under Choices, or in step 1")
     for row in settings.players:
-        _check(row)
+        if row.body is not None:
+            channels.check_local(row.body)
+            channels.check_free(row.body)
+            refuse_system_override(row.body, "body")
     shown.check(*settings.players)
     channels.check_local(settings.rally)
     if settings.rally is not None:
@@ -79,10 +109,8 @@ def order_of(scene: bpy.types.Scene) -> Order:
     unit = (common.library_unit or None) if not settings.library_folder else None
     # without the library's folder: a file may be moved with it
     digest = byte_digest(repr((wanted, chosen, unit, settings.start_frame))).hex()
-    return Order(
-        wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit), digest=digest,
-        build=preferences.for_build(folder),
-    )
+    return Order(wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit),
+                 digest=digest, build=preferences.for_build(folder))
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
@@ -94,15 +122,15 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     if library is None:
         library = build(order.folder, unit=order.unit, **order.build, progress=progress, cancelled=cancelled)
     made = passes(library, order.scene, progress, cancelled)
-    return Result(order, library, made, rally.of_plan(made.plan, made.kind, order.start))
+    return Result(order, library, made, rally_of_plan(made.plan, made.kind, order.start))
 
 
-def flights(order: Order, cancelled) -> rally.Rally:
+def flights(order: Order, cancelled) -> Rally:
     """What is drawn of a scene while it is dragged: its flights alone, without bodies. Never touches bpy."""
     from ...beyond_mocap.passes.passes import ball_of, planned
 
     plan = planned(order.library, order.scene, None, cancelled)
-    return rally.of_plan(plan, ball_of(order.scene), order.start)
+    return rally_of_plan(plan, ball_of(order.scene), order.start)
 
 
 def show(scene: bpy.types.Scene, result: Result) -> None:
@@ -119,15 +147,14 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
     _net(scene, result.order.scene.net)
     bake.lengthen(scene, start + made.plan.seconds * frames_per_second(scene))
     settings.made_of = result.order.digest
-    rally.keep(result.order.digest, result.rally)
+    keep_rally(result.order.digest, result.rally)
     settings.strikes = "\n".join(strike_lines(scene, made, start))
     settings.figures = "\n".join(figures(made))
     settings.told = "\n".join(list(dict.fromkeys([*told, *made.warnings]))[:MOST_LINES])
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away what was made for the scene: bodies, ball, net; bodies of the user's play their own motion again. The
-    lists stay."""
+    """Take away what was made for the scene; bodies of the user's play their own motion again. The lists stay."""
     settings = scene.beyond_mocap_passes
     shown.check(*settings.players)
     if settings.rally is not None:
@@ -162,24 +189,10 @@ def figures(made: "Passes") -> list[str]:
     """Lines "name: value" about the scene."""
     gaps = [gap for one in made.players for gap in one.gaps if not np.isnan(gap)]
     speeds = [float(np.linalg.norm(one.velocity_out)) for one in made.plan.strikes]
-    return [
-        f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
-        f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm", f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
-        f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s",
-    ]
-
-
-def _check(row: BeyondMocapPasser) -> None:
-    """InputError where a player's body cannot be animated."""
-    target = row.body
-    if target is None:
-        return
-    channels.check_local(target)
-    channels.check_free(target)
-    override = target.override_library
-    if override is not None and override.is_system_override:
-        raise InputError(f"body {target.name}", "an override that cannot be edited", "an editable override",
-                         "make it editable: Outliner, Library Override, Make")
+    return [f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
+            f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm",
+            f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
+            f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s"]
 
 
 def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:
@@ -230,9 +243,9 @@ def _tool(scene, target: bpy.types.Object, orders) -> None:
     """What a player strikes with in his hand, where he strikes with anything."""
     striking = next((order for order in orders if order.part == "tool"), None)
     if striking is None:
-        held_tool.remove(target)
+        shown.remove_tool(target)
     else:
-        held_tool.show(scene, target, striking.tool or Tool(), striking.side, bake.collection(scene))
+        shown.show_tool(scene, target, striking.tool or Tool(), striking.side, bake.collection(scene))
 
 
 def _net(scene, net: Net | None) -> None:
@@ -266,3 +279,64 @@ def _net(scene, net: Net | None) -> None:
 
 def _own_net(scene) -> bpy.types.Object | None:
     return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # under any name
+
+
+def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
+    """What is drawn of a plan."""
+    ends = [*(flight.launch.time for flight in plan.flights[1:]), plan.seconds]
+    ways, met = [], []
+    for flight, end in zip(plan.flights, ends):
+        end = min(end, flight.end)
+        bounces = flight.bounces[flight.bounces < end]
+        times = np.unique(np.concatenate([np.arange(flight.launch.time, end, WAY_STEP), bounces, [end]]))
+        ways.append(flight.at(times))
+        met += list(flight.at(bounces) * [1.0, 1.0, 0.0]) if len(bounces) else []
+    return Rally(start, np.array([flight.launch.time for flight in plan.flights]), tuple(ways),
+                 strike_times=np.array([one.order.time for one in plan.strikes]),
+                 strikes=np.array([one.order.ball for one in plan.strikes]), bounces=np.array(met).reshape(-1, 3),
+                 candidates=tuple(_candidates(one, ball) for one in plan.strikes))  # fmt: skip
+
+
+def _candidates(strike, ball: "Ball") -> np.ndarray:
+    """Ways (M, T, 3) that the ball could have taken from a strike (Fig. 6, black)."""
+    from ...beyond_mocap.ball.batch import courses
+
+    natural = strike.natural
+    if natural is None or not len(natural.starts) or strike.travel <= 0.0:
+        return np.zeros((0, 0, 3))
+    few = slice(None, None, max(1, -(-len(natural.starts) // MOST_WAYS)))
+    times = np.linspace(0.0, strike.travel, max(2, int(strike.travel / (2 * WAY_STEP))))
+    return courses(natural.starts[few], natural.velocities[few], None, ball, times)[0]
+
+
+def keep_rally(digest: str, rally: Rally) -> None:
+    """Keep what was made of `digest`, so that undo and redo find it."""
+    _dragged.clear()
+    _rallies.pop(digest, None)
+    _rallies[digest] = rally
+    while len(_rallies) > MOST_RALLIES:
+        _rallies.pop(next(iter(_rallies)))
+
+
+def show_dragged(rally: Rally | None) -> None:
+    """Draw this one while a place is dragged; None: no more."""
+    _dragged[:] = [rally] if rally is not None else []
+
+
+def has_rallies() -> bool:
+    """Whether there is anything to draw; quick, since it is asked at every redraw."""
+    return bool(_rallies or _dragged)
+
+
+def rally_of(scene: bpy.types.Scene) -> Rally | None:
+    """The rally of a scene; None where this session has not made it."""
+    made_of = scene.beyond_mocap_passes.made_of
+    if not made_of:
+        return None
+    return _dragged[0] if _dragged else _rallies.get(made_of)
+
+
+def forget_rallies() -> None:
+    """Nothing is remembered any more."""
+    _rallies.clear()
+    _dragged.clear()

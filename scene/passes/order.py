@@ -1,8 +1,10 @@
-"""The settings as a passing scene of the core, and back: what the panel shows is what a SCENE.json says."""
+"""The settings as a passing scene of the core, and back: what the panel shows is what a SCENE.json says. A pass may be
+struck as an armature's action shows it (eq. 2)."""
 
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import bpy
 import numpy as np
@@ -11,17 +13,22 @@ from ...beyond_mocap.ball.contact import Tool
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.passes.pass_scene import GROUND, LIMITS, BallChoice, Example, Net, Pass, PassScene, Player, Weights
 from ..core.measure import frames_per_second, units_per_metre
+from ..path_editing.carrier import MARK
+from ..path_editing.rigs import carrier_of
 from ..result import bake
-from . import examples, shown
+from . import hits_shown, shown
 from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasses
 
+if TYPE_CHECKING:
+    from ...beyond_mocap.passes.hits import HitMotion
+
 SIZE = 0.5  # metres
-SHIRTS = (
-    (0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
-    (0.02, 0.45, 0.60),
-)
+SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
+          (0.02, 0.45, 0.60))
 NUMBERS = ("radius", "restitution", "linear_drag", "drag", "gravity")
 _DIGITS = 6  # of numbers of single precision
+_MOST_KEPT = 32
+_examples: dict[tuple, "HitMotion"] = {}  # by all that it was read from; asked for again and again during a drag
 
 
 def scene_of(scene: bpy.types.Scene) -> PassScene:
@@ -116,9 +123,8 @@ def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float
 
 def _player(scene, row: BeyondMocapPasser) -> Player:
     if row.place is None or row.place.name not in scene.objects:
-        raise InputError(
-            f"player {row.name}", "nothing that says where he stands", "an object", "choose one as his Place"
-        )
+        raise InputError(f"player {row.name}", "nothing that says where he stands", "an object",
+                         "choose one as his Place")
     place, facing = stands(scene, row.place)
     tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
@@ -132,23 +138,20 @@ def _tool(row: BeyondMocapPasser) -> Tool:
 def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
     """What the strike is to be like: an armature's, or that of a recording of the library."""
     giver = next((one for one in scene.beyond_mocap_passes.players if one.name == row.who), None)
-    if examples.is_wanted(row) and giver is not None:
+    if wants_example(row) and giver is not None:
         own = (giver.bone or giver.part, giver.side)
         part, side = (mine if mine != "own" else usual for mine, usual in zip((row.part, row.side), own))
         tool = _tool(giver) if part == "tool" else None
-        return Example("", hit=examples.hit_of(scene, row, number, part=part, side="" if side == "either" else side,
-                                               tool=tool))
+        return Example("", hit=hit_of(scene, row, number, part=part, side="" if side == "either" else side, tool=tool))
     return Example(row.clip.replace("\\", "/"), _exact(row.first), _exact(row.last) or None) if row.clip else None
 
 
 def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
-    return Pass(
-        row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
-        seconds=_exact(row.seconds) or None, at=at,
-        example=_example(scene, row, number), error="" if row.error == "none" else row.error,
-    )  # fmt: skip
+    return Pass(row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
+                seconds=_exact(row.seconds) or None, at=at, example=_example(scene, row, number),
+                error="" if row.error == "none" else row.error)
 
 
 def _rate(scene) -> float:
@@ -169,12 +172,10 @@ def _weights(row) -> Weights:
         try:
             bones[name.strip()] = float(number)
         except ValueError:
-            raise InputError(
-                "weights of bones", item.strip(), "bones with a number each, such as left foot 2, head 0.5"
-            ) from None
-    return Weights(
-        *(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")), bones
-    )
+            raise InputError("weights of bones", item.strip(),
+                             "bones with a number each, such as left foot 2, head 0.5") from None
+    return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")),
+                   bones)
 
 
 def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
@@ -240,3 +241,71 @@ def _place(values) -> tuple[float, float]:
 def _exact(value: float) -> float:
     """A number of single precision as it was typed."""
     return round(float(value), _DIGITS)
+
+
+def wants_example(row: BeyondMocapPass) -> bool:
+    """Whether an armature shows how the pass is struck; also where that armature is gone."""
+    return row.actor is not None or bool(row.actor_known)
+
+
+def hit_of(
+    scene: bpy.types.Scene, row: BeyondMocapPass, number: int, part: str, side: str, tool: Tool | None
+) -> "HitMotion":
+    """The strongest strike by `part` in the stretch that a pass names of its armature's motion.
+
+    number: of the pass, from 1, for errors. part, side ("": the stronger one), tool: of who strikes. InputError: the
+    armature is gone, is one of the scene's own bodies, does not move, or does not strike there.
+    """
+    body, where = row.actor, f"pass {number}: Like Armature"
+    if body is None or body.name not in scene.objects:
+        raise InputError(where, f"{row.actor_known or body.name} is not in the scene any more",
+                         "an armature that strikes", "choose another one, or empty the field")
+    if any(body in (player.body, player.shown) for player in scene.beyond_mocap_passes.players):
+        raise InputError(where, f"{body.name}, which plays this scene itself", "another armature",
+                         "duplicate it before")
+    if row.actor_cut and row.actor_last <= row.actor_first:
+        raise InputError(where, f"frames {row.actor_first} to {row.actor_last}", "the later frame last")
+    carrier, action = carrier_of(body), body.animation_data and body.animation_data.action
+    key = (body.session_uid, carrier.stamp(scene), carrier.keys_digest(), action and str(action.get(MARK)),
+           row.actor_cut and (row.actor_first, row.actor_last), part, side, tool)
+    if key not in _examples:
+        try:
+            found = _strike_shown(scene, row, part, side, tool)
+        except InputError as error:
+            raise InputError(where, str(error)) from None
+        if len(_examples) >= _MOST_KEPT:
+            _examples.pop(next(iter(_examples)))
+        _examples[key] = found
+    return _examples[key]
+
+
+def list_lost_examples(settings: BeyondMocapPasses) -> str:
+    """A line about examples that a SCENE.json cannot hold, which names recordings of a library only; "" without any."""
+    numbers = [str(number) for number, row in enumerate(settings.passes, start=1) if wants_example(row)]
+    if not numbers:
+        return ""
+    passes = f"{'passes' if len(numbers) > 1 else 'pass'} {', '.join(numbers)}"
+    return f"without the example of {passes}, an armature: a file can name recordings of the library only"
+
+
+def forget_examples() -> None:
+    """Read armatures anew: what constraints of one follow may have changed unseen."""
+    _examples.clear()
+
+
+def _strike_shown(scene, row: BeyondMocapPass, part: str, side: str, tool: Tool | None) -> "HitMotion":
+    from ...beyond_mocap.passes.hits import strongest
+
+    body = row.actor
+    motion, start = hits_shown.motion_of(scene, body)
+    first, last = (row.actor_first, row.actor_last) if row.actor_cut else (start, start + len(motion) - 1)
+    stretch = motion.frames(max(0, first - start), max(0, last - start + 1))
+    span = f"frames {first} to {last}"
+    if len(stretch) < 3:
+        end = start + len(motion) - 1
+        raise InputError(f"armature {body.name}", f"no motion on {span}", f"a stretch of its frames {start} to {end}")
+    hit = strongest(stretch, part, side, tool)
+    if hit is None:
+        raise InputError(f"armature {body.name}", f"no strike by {' '.join(filter(None, (side, part)))} on {span}",
+                         "a stretch with a whole strike", "see Hit Analysis for what it has")
+    return hit

@@ -23,7 +23,7 @@ from ...beyond_mocap.motion.humanoid import identify
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import bring_back, put_aside
-from ..path_editing.rig_look import alone
+from ..path_editing.rig_look import alone, channel_of, turns
 from ..result.result import BeyondMocapBefore
 from ..rigs import armature
 from .settings import KEPT, BeyondMocapHold
@@ -32,7 +32,6 @@ CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it
 FASTEST = 8.0  # m/s at which a ball comes to where it is carried; from afar it takes longer than it is set to
 JUST_BEFORE = 0.02  # frames; Blender takes keys within 0.01 for one
 SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # metres from a bone to the skin over it
-_TURNS = {"QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
 
 
 def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> str:
@@ -44,9 +43,8 @@ def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str
         "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest,
     }[part]  # fmt: skip
     if joint is None:
-        raise InputError(
-            f"armature {body.name}", f"no bone for {part}", "a humanoid", "choose another part, or name the bone"
-        )
+        raise InputError(f"armature {body.name}", f"no bone for {part}", "a humanoid",
+                         "choose another part, or name the bone")
     return skeleton.names[joint]
 
 
@@ -60,10 +58,9 @@ def take(
     _check(ball, body, bone, first, last)
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
-            raise InputError(
-                f"ball {ball.name}", f"carried by {_name(other)} on frames {other.first} to {other.last} already",
-                "other frames", "free the ball there first",
-            )
+            raise InputError(f"ball {ball.name}",
+                             f"carried by {holder_name(other)} on frames {other.first} to {other.last} already",
+                             "other frames", "free the ball there first")
     if not ball.beyond_mocap_ball.before.kept:
         put_aside(ball.beyond_mocap_ball.before, ball)
     hold = ball.beyond_mocap_ball.holds.add()
@@ -131,8 +128,7 @@ def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
 def own_way(
     scene: bpy.types.Scene, ball: bpy.types.Object, holds
 ) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
-    """Frames (F,), the ball's own place on each, and the first and last frame on which its own action has a key; None
-    where it has none."""
+    """Frames (F,), the ball's own place on each, and the first and last frame with a key of its own action, or None."""
     curves, stance = played_before(ball.beyond_mocap_ball.before)
     ends = channels.keyed_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
@@ -144,33 +140,38 @@ def own_way(
 
 def played_before(before: BeyondMocapBefore) -> tuple[dict, list]:
     """The curves of what a ball played before, and how it stood, as `set_aside.stance_of` has it."""
+    return curves_before(before), json.loads(before.stance)[""]
+
+
+def curves_before(before: BeyondMocapBefore) -> dict:
+    """The curves of what an object played before, by data path and index."""
     slots = before.action.slots if before.action is not None else ()
     slot = next((one for one in slots if one.identifier == before.slot), None)
-    return channels.curves(before.action, slot) if slot is not None else {}, json.loads(before.stance)[""]
+    return channels.curves(before.action, slot) if slot is not None else {}
 
 
 def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
     """Where a ball is on frames (F,), units, by its curves and how it stands without them."""
     mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     still = dict(zip(paths, stance[1:]))
+    places, turned = (sample_property(curves, path, frames, still[path]) for path in ("location", channel_of(mode)))
+    return [Matrix.LocRotScale(place, Quaternion(turns(mode, turn[None])[0]), None)
+            for place, turn in zip(places, turned)]
 
-    def values(path: str) -> np.ndarray:
-        columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
-                   for i, value in enumerate(still[path])]
-        return np.stack(columns, axis=1)
 
-    places, turns = values("location"), values(_TURNS.get(mode, "rotation_euler"))
-    return [Matrix.LocRotScale(place, _turn(mode, turn), None) for place, turn in zip(places, turns)]
+def sample_property(curves: dict, path: str, frames: np.ndarray, still) -> np.ndarray:
+    """Values (F, n) of a property on frames (F,) by its curves; where it has none as in `still` (n,)."""
+    columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
+               for i, value in enumerate(still)]
+    return np.stack(columns, axis=1)
 
 
 def check_unaimed(ball: bpy.types.Object) -> None:
-    """InputError for a ball that is aimed or that rigid bodies move: who carries it would not be seen, or its aim be
-    lost."""
+    """InputError for a ball that is aimed or moved by rigid bodies: a hold would not be seen, or the aim be lost."""
     aim = ball.beyond_mocap_aim
     if aim.handed:
-        raise InputError(
-            f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed", "press Take Ball Back first"
-        )
+        raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed",
+                         "press Take Ball Back first")
     if aim.on:
         raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not", "press Leave Aim first")
 
@@ -180,26 +181,19 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
     channels.check_free(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:
-        raise InputError(
-            f"armature {body.name}", f"no bone {bone!r}", "one of its bones", "look at their names in pose mode"
-        )
+        raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones",
+                         "look at their names in pose mode")
     if last <= first:
-        raise InputError(
-            "possession", f"from frame {first} to {last}", "a last frame behind the first", "set From and To"
-        )
+        raise InputError("possession", f"from frame {first} to {last}", "a last frame behind the first",
+                         "set From and To")
     if ball.parent is not None:
         raise InputError(f"ball {ball.name}", f"a child of {ball.parent.name}", "an object without a parent",
                          "clear its parent with Alt-P, Clear and Keep Transformation")
     playing = ball.animation_data
-    if (
-        playing is not None
-        and playing.use_nla
-        and any(not track.mute and len(track.strips) for track in playing.nla_tracks)
-    ):
-        raise InputError(
-            f"ball {ball.name}", "it plays NLA strips", "an action of its own",
-            "bake them: NLA editor, Edit, Bake Action",
-        )
+    tracks = playing.nla_tracks if playing is not None and playing.use_nla else ()
+    if any(not track.mute and len(track.strips) for track in tracks):
+        raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own",
+                         "bake them: NLA editor, Edit, Bake Action")
     if ball == body or ball.type == "ARMATURE":
         raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
 
@@ -229,10 +223,9 @@ def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None
     count = len(bones) - 1
     way = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
     least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
-    settle = (
-        max(1, min(max(hold.settle, int(np.ceil(least))), count // 2)) if hold.how != "KEEP" or end is not None else 0
-    )
-    found = []
+    settle, found = 0, []
+    if hold.how != "KEEP" or end is not None:
+        settle = max(1, min(max(hold.settle, int(np.ceil(least))), count // 2))
     for row in range(count + 1):
         place = held
         if hold.how != "KEEP" and row < settle:
@@ -270,7 +263,7 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
     rows.sort(key=lambda row: row[0])
     at = np.array([frame for frame, _ in rows])
     mode = ball.rotation_mode
-    path = _TURNS.get(mode, "rotation_euler")
+    path = channel_of(mode)
     curves = {"location": ("Object Transforms", np.array([place.to_translation() for _, place in rows])),
               path: ("Object Transforms", _turns(mode, [place.to_quaternion() for _, place in rows]))}
     for hold, _ in lets_go:
@@ -285,13 +278,6 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
         still = np.ones(len(at), bool) if name.endswith("influence") else ends
         curve.keyframe_points.foreach_set("interpolation", np.where(still, CONSTANT, channels.LINEAR).astype(np.int32))
         curve.update()
-
-
-def _turn(mode: str, values: np.ndarray) -> Quaternion:
-    """A rotation from the values of its channel in a rotation mode."""
-    from ..path_editing.rig_look import turns
-
-    return Quaternion(turns(mode, values[None])[0])
 
 
 def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
@@ -313,5 +299,6 @@ def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
     return np.array(found)
 
 
-def _name(hold) -> str:
+def holder_name(hold) -> str:
+    """Who carries the ball for a while."""
     return hold.body.name if hold.body is not None else "somebody"

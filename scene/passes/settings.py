@@ -23,13 +23,10 @@ from ..result.result import BeyondMocapBefore
 pictures: dict = {}
 """The painted pictures of hit analyses: a preview collection under "graphs", while there are any."""
 
-SAMPLES = (
-    ("three", "Three", "Three players, a triangle of passes"),
-    ("six", "Six", "Six players, two teams of three"),
-    ("volley_net", "Foot Volleyball", "Four players over a net"),
-    ("racquet", "Racquet", "Two players, tools in their hands"),
-    ("dropped", "Dropped Ball", "Three players; one of them errs"),
-)
+SAMPLES = (("three", "Three", "Three players, a triangle of passes"), ("six", "Six", "Six players, two teams of three"),
+           ("volley_net", "Foot Volleyball", "Four players over a net"),
+           ("racquet", "Racquet", "Two players, tools in their hands"),
+           ("dropped", "Dropped Ball", "Three players; one of them errs"))
 PLAYED = "live"  # `made_of` of a scene that was played live: no edit of the lists makes it anew
 KEPT = "beyond_mocap_scene_ball"  # custom property of balls and actions made here; no group has its name
 
@@ -72,18 +69,12 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
         description="The object that says where the player stands, and by its local X which way he looks; drag it "
         "with G, turn it with R",
     )
-    body: PointerProperty(
-        name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
-        description="The armature that the player's motion is shown on; made where it is missing",
-    )
-    shirt: FloatVectorProperty(
-        name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-        description="Colour of the shirt",
-    )
-    shown: PointerProperty(
-        name="Shown On", type=bpy.types.Object, options={"HIDDEN"},
-        description="The armature that shows the scene now; before: what it played",
-    )
+    body: PointerProperty(name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
+                          description="The armature that the player's motion is shown on; made where it is missing")
+    shirt: FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
+                               description="Colour of the shirt")
+    shown: PointerProperty(name="Shown On", type=bpy.types.Object, options={"HIDDEN"},
+                           description="The armature that shows the scene now; before: what it played")
     before: PointerProperty(type=BeyondMocapBefore, description="What the body played before the scene was made")
 
 
@@ -93,10 +84,8 @@ class BeyondMocapPass(bpy.types.PropertyGroup):
 
     who: StringProperty(name="From", description="Who sends the ball", update=touch_live)
     to: StringProperty(name="To", description="Who gets it", update=touch_live)
-    at: PointerProperty(
-        name="Meet At", type=bpy.types.Object, update=touch_live,
-        description="An object to which the receiver goes to meet the ball; none: where he stands",
-    )
+    at: PointerProperty(name="Meet At", type=bpy.types.Object, update=touch_live,
+                        description="An object to which the receiver goes to meet the ball; none: where he stands")
     actor: PointerProperty(
         name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=chosen,
         description="An armature whose own motion shows the strike: the one most like it is played, in place "
@@ -170,13 +159,11 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, update=touch_live,
         description="Folder of clips with strikes from a stand; empty: the library of step 1",
     )
-    rally: PointerProperty(
-        name="Ball Object", type=bpy.types.Object, description="The ball of the scene; made where it is missing"
-    )
+    rally: PointerProperty(name="Ball Object", type=bpy.types.Object,
+                           description="The ball of the scene; made where it is missing")
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before the scene was made")
-    made_of: StringProperty(
-        name="Made Of", options={"HIDDEN"}, description="Digest of what the scene shown was made of"
-    )
+    made_of: StringProperty(name="Made Of", options={"HIDDEN"},
+                            description="Digest of what the scene shown was made of")
     told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the scene that is shown")
     strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="A line for each strike: frame, text")
@@ -224,6 +211,6 @@ def picture_name(hits: BeyondMocapHits) -> str:
 
 
 def picture_icon(hits: BeyondMocapHits) -> int:
-    """The picture's number for a layout; 0 while it is not painted (`graph.paint`)."""
+    """The picture's number for a layout; 0 while it is not painted (`hits_shown.paint`)."""
     kept, name = pictures.get("graphs"), picture_name(hits)
     return kept[name].icon_id if kept is not None and name in kept else 0

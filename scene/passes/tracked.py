@@ -72,8 +72,7 @@ def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
 
 
 def together(named: tuple):
-    """The tracks of several players, (name, track) each, as one match at the times of the first; one alone stays a
-    track."""
+    """The tracks of several players, (name, track) each, as one match at the first one's times; one stays a track."""
     from ...beyond_mocap.ball.tracked.solve import PITCH
     from ...beyond_mocap.files.tracking.tracking import Match, MatchPlayer
 
@@ -101,7 +100,9 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     channels.check_local(target)
     channels.check_free(target)
     possession.check_unaimed(target)
-    times = _frames_between(scene, float(solved.times[0]), float(solved.times[-1]))
+    clock, (start, end) = scene_clock(scene), (float(solved.times[0]), float(solved.times[-1]))
+    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    times = clock.start_time + (frames - clock.start_frame) / frames_per_second(scene)
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
     target[KEPT] = BALL  # under any name
 
@@ -116,8 +117,7 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
 
 
 def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
-    """Make key moments of the ticked touches (of one player, or of all in the list of players); how many came of it,
-    and a line for each that did not."""
+    """Make key moments of the ticked touches (of one player, or of all); how many, and a line for each that failed."""
     settings, told, count = context.scene.beyond_mocap, [], 0
     found = {player.name: player for player in settings.players}
     for touch in context.scene.beyond_mocap_passes.touches:
@@ -166,7 +166,7 @@ def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
     """Why a touch becomes no key moment of a player; "" where it may. He has a timeline afterwards."""
     target = strips.with_lanes(context, player)
     clock = scene_clock(context.scene)
-    first, last = (clock.seconds(frame) for frame in _ends(player))
+    first, last = (clock.seconds(frame) for frame in dots.keyed_frames(player.dot) or (-np.inf, np.inf))
     if not first <= touch.time <= last:
         return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
     near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
@@ -174,14 +174,3 @@ def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
         there = f"{player.name}: has a key moment at {near[0].key.time:.2f} s"
         return f"{there}, so none is added for the touch at {touch.time:.2f} s"
     return ""
-
-
-def _ends(player) -> tuple[float, float]:
-    return dots.keyed_frames(player.dot) or (-np.inf, np.inf)
-
-
-def _frames_between(scene, start: float, end: float) -> np.ndarray:
-    """The seconds of all whole scene frames from one second to another."""
-    clock, fps = scene_clock(scene), frames_per_second(scene)
-    frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
-    return clock.start_time + (frames - clock.start_frame) / fps

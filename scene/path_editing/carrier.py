@@ -1,4 +1,5 @@
-"""What carries a motion: how an armature's motion is read, and how the ridden one is written onto it.
+"""What carries a motion: how an armature's motion is read, and how the ridden one is written onto it. The original,
+relative to its own path, is worked out once and kept as long as nothing of it changes.
 
 `PlainCarrier` knows armatures whose bones are keyed themselves. Other kinds are in `rigs`, where `carrier_of` chooses.
 """
@@ -12,7 +13,7 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.digest import byte_digest
-from ...beyond_mocap.base.errors import InputError
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
 from ..core import action, channels
@@ -21,8 +22,13 @@ from ..core.set_aside import bring_back, put_aside
 from ..rigs import armature
 from . import keys
 
-MARK = "beyond_mocap_ride"
-"""Custom property of an action that a rider plays: a digest of what it was made of."""
+MARK = "beyond_mocap_ride"  # custom property of an action that a rider plays: a digest of what it was made of
+MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
+
+_sources: dict[int, Source] = {}  # by session_uid of the armature
+# likewise: the original action and its keys' digest, until they may have changed
+_keys: dict[int, tuple[int, bytes]] = {}
+_refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of what could not be read, and why
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +53,24 @@ def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object
     return before.action, next((slot for slot in slots if slot.identifier == before.slot), slots[0] if slots else None)
 
 
+def no_motion(body: bpy.types.Object) -> InputError:
+    """The error of an armature that plays nothing."""
+    return InputError(f"armature {body.name}", "it plays no action", "a motion", "import one, or choose an action")
+
+
+def check_finite(body: bpy.types.Object, motion: Motion) -> None:
+    """InputError where an armature's motion has a pose that is no number."""
+    if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
+        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+
+
+def refuse_system_override(body: bpy.types.Object, what: str = "armature") -> None:
+    """InputError where an object is a library override that cannot be edited."""
+    if body.override_library is not None and body.override_library.is_system_override:
+        raise InputError(f"{what} {body.name}", "an override that cannot be edited", "an editable override",
+                         "make it editable: Outliner, Library Override, Make")
+
+
 class Carrier(ABC):
     """One armature for the length of one event; nothing of Blender's is kept in it longer than that."""
 
@@ -66,14 +90,10 @@ class Carrier(ABC):
         """InputError where the armature cannot ride."""
         body = self.body
         channels.check_local(body)
-        override = body.override_library
-        if override is not None and override.is_system_override:
-            raise InputError(f"armature {body.name}", "an override that cannot be edited", "an editable override",
-                             "make it editable: Outliner, Library Override, Make")
+        refuse_system_override(body)
         if body.mode == "EDIT":
-            raise InputError(
-                f"armature {body.name}", "its bones are being edited", "object or pose mode", "leave edit mode (Tab)"
-            )
+            raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
+                             "leave edit mode (Tab)")
         channels.check_free(body)
 
     @abstractmethod
@@ -117,8 +137,7 @@ class Carrier(ABC):
         found, slot = channels.playing(self.body)
         if found is None or not found.get(MARK):
             raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride",
-                             "that action",
-                             "choose it again in the Action Editor, or press Leave")
+                             "that action", "choose it again in the Action Editor, or press Leave")
         channels.check_local(found)
         if found.users - found.use_fake_user < 2:
             return found, slot
@@ -138,9 +157,7 @@ class PlainCarrier(Carrier):
     def _original(self) -> tuple[bpy.types.Action, object]:
         found, slot = self.source()
         if found is None:
-            raise InputError(
-                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise no_motion(self.body)
         return found, slot
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
@@ -202,21 +219,64 @@ class PlainCarrier(Carrier):
             turns[:, 0] = quaternion.multiply(quaternion.inverse(lie.rotation), turns[:, 0])
         poses = quaternion.multiply(quaternion.multiply(quaternion.inverse(at_rest), turns), at_rest)
         shift = lie.to_armature(motion.root_positions) - np.array(bones[0].bone.head_local)
-        found = _columns(_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
+        found = keys.columns(_path(bones[0], "location"), quaternion.rotate(quaternion.inverse(rest[0]), shift))
         for number, joint in enumerate(joints):
             mode = bones[joint].rotation_mode
-            found |= _columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
+            found |= keys.columns(_path(bones[joint], mode), keys.rotation(mode, poses[:, number]))
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """read: the original motion; core: it relative to its own path; digest: of what both were made of."""
+
+    read: Read
+    core: object
+    digest: bytes
+
+
+def forget_sources() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _sources.clear()
+    recheck_sources()
+
+
+def recheck_sources() -> None:
+    """Keys of any original may be others: they are looked at again, those too that could not be read."""
+    _keys.clear()
+    _refused.clear()
+
+
+def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
+    """An armature's original motion for these settings of the core. InputError where there is none."""
+    from ...beyond_mocap.path_editing.ride import prepare
+
+    uid, wishes = carrier.body.session_uid, tuple(getattr(settings, name) for name in MADE_OF)
+    original = carrier.source()[0]
+    number = original.session_uid if original is not None else 0
+    if uid not in _keys or _keys[uid][0] != number:
+        _keys[uid] = number, carrier.keys_digest()
+    digest = byte_digest(_keys[uid][1], carrier.stamp(scene), repr(wishes))
+    known = _sources.get(uid)
+    if known is not None and known.digest == digest:
+        return known
+    if _refused.get(uid, (b"", ""))[0] == digest:
+        raise BeyondMocapError(_refused[uid][1])
+    keys.refresh()
+    try:
+        read = carrier.read(scene)
+        found = Source(read, prepare(read.motion, settings, read.standing), digest)
+    except BeyondMocapError as error:  # to look at a rig is a change of frame: it would be looked at again and again
+        _refused[uid] = digest, str(error)
+        raise
+    _sources[uid] = found
+    return found
 
 
 def _path(bone: bpy.types.PoseBone, what: str) -> str:
     """The data path of a bone's location, or of its rotation in a mode."""
     name = {"location": "location", "QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
     return f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name.get(what, "rotation_euler")}'
-
-
-def _columns(path: str, values: np.ndarray) -> dict[keys.Place, np.ndarray]:
-    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
 
 
 def _changed(before: Motion, after: Motion) -> np.ndarray:

@@ -1,4 +1,5 @@
-"""The new path as an ordinary curve object: read as it lies in the world, also while it is being edited; and made."""
+"""What a rider follows: the new path as an ordinary curve object, read as it lies in the world, also while it is being
+edited, and made; and the ground that its feet follow."""
 
 from __future__ import annotations
 
@@ -15,15 +16,11 @@ from ...beyond_mocap.motion.path.path import Path
 from ..core.measure import units_per_metre
 from ..player.drawn_track import points_of
 
-KINDS = (
-    ("BEZIER", "Bezier", "Points on the path, with handles"),
-    ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"),
-)
-SHAPES = (
-    ("FITTED", "Original", "Along the original path"),
-    ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
-    ("PRESENT", "As It Is", "Along the new path as it is, with other points"),
-)
+KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
+         ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
+SHAPES = (("FITTED", "Original", "Along the original path"),
+          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
+          ("PRESENT", "As It Is", "Along the new path as it is, with other points"))
 MARK = "beyond_mocap_path"  # on curve objects that were made here
 _STEP, _PIECES = 0.04, (8, 600)  # metres between places on a Bezier segment; how many there are of them
 _NURBS_PIECES = 48
@@ -32,6 +29,7 @@ _CLOSE = 0.03  # metres from the path that a fitted curve may be
 _APART = 5.0  # metres that points are apart at most, so that there is always one to pull
 _NEAREST, _MOST = 0.08, 240  # metres that Bezier points are apart at least, and how many there are at most
 _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
+_grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object: digest, `Terrain`
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,9 +80,8 @@ class Drawn:
 def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
     """A curve object as it is drawn now. InputError where it has no line."""
     if drawn is None or drawn.name not in scene.objects:
-        raise InputError(
-            "new path", "its curve is gone from the scene", "a curve object", "choose another, or make a New Curve"
-        )
+        raise InputError("new path", "its curve is gone from the scene", "a curve object",
+                         "choose another, or make a New Curve")
     if drawn.type != "CURVE":
         raise InputError(f"object {drawn.name}", "no curve", "a curve object (Add > Curve)", "choose another")
     lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]
@@ -151,6 +148,14 @@ def create(
     return made
 
 
+def remove_curve(drawn: bpy.types.Object) -> None:
+    """Take a curve object out of the file, and its curve with it where no other object has that."""
+    data = drawn.data
+    bpy.data.objects.remove(drawn)
+    if not data.users:
+        bpy.data.curves.remove(data)
+
+
 def is_animated(drawn: bpy.types.Object) -> bool:
     """Whether an object, a curve or the ground, goes elsewhere with the frame, by itself or with what it hangs on."""
     known, waiting = set(), [drawn]
@@ -164,6 +169,54 @@ def is_animated(drawn: bpy.types.Object) -> bool:
             return True
         waiting += [thing.parent, *(getattr(constraint, "target", None) for constraint in thing.constraints)]
     return False
+
+
+def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
+    """Another where the ground's mesh, as it is shown, is another; not where its object is animated: it counts where it
+    lay when something was edited. InputError where it was deleted."""
+    if ground is None:
+        return b""
+    if ground.name not in scene.objects:
+        raise InputError("ground", f"{ground.name} is gone from the scene", "a mesh object", "choose another, or none")
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = shown.to_mesh()  # also while it is being edited
+    parts = [_vertices(mesh)]
+    if corners := mesh.attributes.get(".corner_vert"):  # at once; triangles take Blender ten times as long
+        found = np.empty(len(corners.data), np.int32)
+        corners.data.foreach_get("value", found)
+        parts += [found, len(mesh.polygons).to_bytes(8, "little")]
+    shown.to_mesh_clear()
+    if not is_animated(ground):
+        parts.append(np.array(shown.matrix_world))
+    return byte_digest(*parts)
+
+
+def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:
+    """Lines for the user."""
+    moves = ground is not None and is_animated(ground)
+    return (f"ground {ground.name}: it moves; feet follow it as it lay when it was chosen or edited last",
+            ) if moves else ()
+
+
+def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):
+    """The `Terrain` of a mesh object in metres; None without one. digest: of `ground_digest`."""
+    from ...beyond_mocap.motion.path.terrain import Terrain
+
+    if ground is None:
+        return None
+    units = units_per_metre(scene)
+    digest += repr(units).encode()
+    if _grounds.get(ground.session_uid, (b"", None))[0] != digest:
+        places, corners = _mesh(ground)
+        if not len(corners):
+            raise InputError(f"ground {ground.name}", "a mesh without faces", "a surface", "choose another")
+        _grounds[ground.session_uid] = digest, Terrain(places / units, corners)
+    return _grounds[ground.session_uid][1]
+
+
+def forget_grounds() -> None:
+    """Nothing is remembered any more: another file is open."""
+    _grounds.clear()
 
 
 def _control_points(spline: bpy.types.Spline) -> np.ndarray:
@@ -303,3 +356,21 @@ def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
 
     whole = points[-1] - points[0]
     return points[0] + (points - points[0]) * ((ArcLength(path).length + _SPARE) / np.linalg.norm(whole))
+
+
+def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh object as it is shown: vertices (V, 3) in the world, in Blender's units, and triangles (F, 3)."""
+    shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = shown.to_mesh()
+    places, corners = _vertices(mesh), np.empty(3 * len(mesh.loop_triangles), np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    shown.to_mesh_clear()
+    world = np.array(shown.matrix_world)
+    return places @ world[:3, :3].T + world[:3, 3], corners.reshape(-1, 3)
+
+
+def _vertices(mesh: bpy.types.Mesh) -> np.ndarray:
+    """Places (V, 3) of a mesh, in its own space."""
+    places = np.empty(3 * len(mesh.vertices), np.float32)
+    mesh.vertices.foreach_get("co", places)
+    return places.reshape(-1, 3)

@@ -1,27 +1,35 @@
 """Riders keep apart: which of them come too near each other, or another body, and what each is asked to do about it.
 
 What is asked is part of a rider's settings: seconds added to its delay, and detours of its path. Each time it is worked
-out from the curves as they are drawn and the delays that the user chose.
+out from the curves as they are drawn and the delays that the user chose. Riders keep clear of bystanders too: bodies of
+the scene that ride no path, such as kept ones and players.
 """
 
 from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from time import perf_counter
 
 import bpy
 import numpy as np
 
-from ...beyond_mocap.base.errors import BeyondMocapError
-from ..core.measure import frames_per_second
-from . import curve, riders, source
-from .bystanders import bystanders
-from .carrier import MARK
-from .rigs import carrier_of
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ..core import channels
+from ..core.measure import frames_per_second, units_per_metre
+from ..rigs.bone_curves import is_carried
+from . import curve, riders, rig_look, rig_parts
+from .carrier import MARK, read_source, recheck_sources
+from .rig_source import Played, playing_strips
+from .rigs import carrier_of, rides_as_rig
 from .settings import riders as all_riders
 from .settings import wishes
 
 _ROUNDS = 2  # the second with room for what the search does not reckon with exactly
+
+HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
+_A_SECOND = 5  # looks at a rig
+_PATIENCE = 4.0  # seconds for all
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +43,14 @@ class Trial:
     settings: object
     ground: object
 
-    def ridden(self, change):
-        """The rider's motion with a `Change`; its feet do not matter here."""
+    def follower(self, change, may_change: bool = True):
+        """The rider with a `Change` as a body of the core; its feet do not matter here."""
+        from ...beyond_mocap.path_editing.follower import Follower
         from ...beyond_mocap.path_editing.ride import ride
 
         settings = replace(self.settings, delay=self.settings.delay + change.delay, detours=change.detours, plant=False)
-        return ride(self.known, self.path, settings, self.ground)
-
-    def follower(self, change, may_change: bool = True):
-        """The rider with a `Change` as a body of the core."""
-        from ...beyond_mocap.path_editing.follower import Follower
-
-        ridden = self.ridden(change)
-        fps = ridden.motion.fps
-        times = (self.first + np.arange(len(ridden.motion))) / fps
+        ridden = ride(self.known, self.path, settings, self.ground)
+        times = (self.first + np.arange(len(ridden.motion))) / ridden.motion.fps
         places = np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]])
         if not may_change:
             return Follower(name=self.name, times=times, places=places)
@@ -59,8 +61,7 @@ class Trial:
 @dataclass(frozen=True)
 class Kept:
     """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were;
-    changes: one `Change` a rider; left: lines about those that stay, and
-    about who was left out."""
+    changes: one `Change` a rider; left: lines about those that stay, and about who was left out."""
 
     bodies: tuple[str, ...]
     before: int
@@ -79,7 +80,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 
     scene = context.scene
     context.view_layer.update()
-    source.unsure()
+    recheck_sources()
     trials = [_trial(scene, body) for body in bodies]
     standing, unread = bystanders(context)
     fixed = _others(scene, bodies) + standing
@@ -102,8 +103,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 
 
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
-    """Ask riders for these changes, instead of those before, and bring them up to date. InputError, and all as before,
-    where one of them cannot follow."""
+    """Ask riders for these changes and bring them up to date. InputError, and all as before, if one cannot follow."""
     from ...beyond_mocap.path_editing.follower import Change
 
     rides = [body.beyond_mocap_ride for body in bodies]
@@ -135,8 +135,8 @@ def _trial(scene, body) -> Trial:
     ride, carrier = body.beyond_mocap_ride, carrier_of(body)
     carrier.check()
     settings = RideSettings(**{**wishes(ride), "detours": (), "delay": round(_own_delay(ride), 6)})
-    known = source.of(carrier, scene, settings)
-    ground = source.ground_of(scene, ride.ground, source.ground_digest(scene, ride.ground))
+    known = read_source(carrier, scene, settings)
+    ground = curve.ground_of(scene, ride.ground, curve.ground_digest(scene, ride.ground))
     return Trial(body.name, known.read.first, known.core, path=curve.read(scene, ride.curve).path(), settings=settings,
                  ground=ground)
 
@@ -199,3 +199,87 @@ def _line(hit, names, fps) -> str:
     frames = f"frames {round(hit.start * fps)} to {round(hit.end * fps)}"
     both = f"{names[hit.first]} and {names[hit.second]}"
     return f"{both} still come within {hit.gap:.2f} m at {hit.time:.2f} s ({frames})"
+
+
+def bystanders(context: bpy.types.Context, patience: float = _PATIENCE) -> tuple[list, list[str]]:
+    """Followers of the core that cannot be asked to give way: the bodies of players, and all other animated armatures
+    that are visible and do not hang on a rider. And a line for each that is left out: for want of time after `patience`
+    seconds, or since it cannot be read."""
+    begun, found, left = perf_counter(), [], []
+    for body in sorted(_bodies(context), key=rides_as_rig):  # the quick ones first
+        try:
+            found.append(_follower(context.scene, body, begun + patience))
+        except BeyondMocapError as error:
+            left.append(f"{body.name} is left out: {error}")
+    return found, left
+
+
+def _bodies(context) -> list[bpy.types.Object]:
+    scene, layer = context.scene, context.view_layer
+    players = {player.body.name for player in scene.beyond_mocap.players if player.body is not None}
+    found = [body for body in scene.objects if body.type == "ARMATURE" and not body.beyond_mocap_ride.on]
+    return [body for body in found if (channels.playing(body)[0] is not None or playing_strips(body))
+            and (body.name in players or body.visible_get(view_layer=layer) and not _hangs_on_rider(body))]
+
+
+def _hangs_on_rider(body) -> bool:
+    """Whether it shows what a rider does, as a character does that was retargeted from it."""
+    constraints = [one for thing in (body, *body.pose.bones) for one in thing.constraints if not one.mute]
+    holders = [getattr(one, "target", None) for one in constraints]
+    while body.parent is not None:
+        body = body.parent
+        holders.append(body)
+    return any(one is not None and one.type == "ARMATURE" and one.beyond_mocap_ride.on for one in holders)
+
+
+def _follower(scene, body, until: float):
+    """Where its hips are over the ground. InputError past the time `until`."""
+    from ...beyond_mocap.path_editing.follower import Follower
+
+    if perf_counter() > until:
+        raise _late()
+    try:
+        if rides_as_rig(body):
+            raise InputError(body.name, "a rig")
+        read = carrier_of(body).read(scene)
+        frames, hips = read.first + np.arange(len(read.motion)), read.motion.root_positions
+    except BeyondMocapError:  # it is looked at instead
+        frames, hips = _looked_at(scene, body, until)
+    if not np.isfinite(hips).all():
+        raise InputError("its pose", "a place that is no number", "numbers", "look at its keys")
+    return Follower(name=body.name, times=frames / frames_per_second(scene), places=hips - (0.0, 0.0, HIPS))
+
+
+def _looked_at(scene, body, until: float) -> tuple[np.ndarray, np.ndarray]:
+    """Some frames (F,) and its hips (F, 3) on them, metres; the middle of its bones where it has no hips."""
+    frames = _frames(scene, body)
+    parts = rig_parts.of_rig(body)
+    names = [parts.shown["hips"]] if parts else [bone.name for bone in body.data.bones]
+    rows = []
+    with rig_look.alone(body, scene) as side:
+        for frame in frames:
+            if perf_counter() > until:
+                raise _late()
+            side.frame_set(int(frame))
+            shown = body.evaluated_get(side.view_layers[0].depsgraph)
+            middle = np.mean([shown.pose.bones[name].head[:] for name in names], axis=0)
+            rows.append(np.array(shown.matrix_world) @ [*middle, 1.0])
+    return frames, np.array(rows)[:, :3] / units_per_metre(scene)
+
+
+def _frames(scene, body) -> np.ndarray:
+    """Whole frames from the first to the last of its motion, about `_A_SECOND`."""
+    try:
+        played = Played(body, scene).frames
+        first, last = int(played[0]), int(played[-1])
+    except BeyondMocapError:  # a pose alone
+        first = last = scene.frame_start
+    if is_carried(body):
+        first, last = min(first, scene.frame_start), max(last, scene.frame_end)
+    step = max(int(frames_per_second(scene) / _A_SECOND), 1)
+    return np.unique([*range(first, last, step), last, last + (first == last)])
+
+
+def _late() -> InputError:
+    found, expected = "too slow to be looked at as well", "a quick one"
+    return InputError("its rig", found, expected, "hide what is not needed, or bake its motion")

@@ -49,9 +49,13 @@ def places(curve: bpy.types.FCurve) -> np.ndarray:
     return values
 
 
+def columns(path: str, values: np.ndarray) -> dict[Place, np.ndarray]:
+    """Values (N, n) of a property, one channel each."""
+    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
+
+
 def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
-    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original come
-    off."""
+    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original go."""
     for slot in [slot for slot in made.slots if slot.identifier != identifier]:
         made.slots.remove(slot)
     for name in [name for name in made.keys() if name.startswith("beyond_mocap")]:
@@ -141,8 +145,7 @@ def rotation(mode: str, pose: np.ndarray) -> np.ndarray:
 
 
 def _continuous(turns: np.ndarray) -> np.ndarray:
-    """Euler angles (N, 3) without jumps: each rotation has two sets of angles, (a, b, c) and (a + pi, pi - b, c +
-    pi)."""
+    """Euler angles (N, 3) without jumps: of each rotation (a, b, c) or (a + pi, pi - b, c + pi)."""
     other = np.stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi], axis=1)
     stay = np.abs(quaternion.wrapped(turns[1:] - turns[:-1])).sum(axis=1)
     swap = np.abs(quaternion.wrapped(other[1:] - turns[:-1])).sum(axis=1)
@@ -178,11 +181,8 @@ def _write(sheet: Sheet, place: Place, keys: np.ndarray, fresh: bool) -> None:
 def _curve(sheet: Sheet, place: Place) -> bpy.types.FCurve:
     if place not in sheet.curves:
         like = next((curve for (path, _), curve in sheet.sources.items() if path == place[0] and curve.group), None)
-        group = like.group.name if like is not None else _bone(place[0])
+        bone = place[0].split('"')[1] if place[0].startswith("pose.bones") else ""
+        group = like.group.name if like is not None else bone
         sheet.curves[place] = channels.new_curve(sheet.made, sheet.slot, *place, group)
     return sheet.curves[place]
 
-
-def _bone(path: str) -> str:
-    """The bone that a data path is about; empty where it is about none."""
-    return path.split('"')[1] if path.startswith("pose.bones") else ""

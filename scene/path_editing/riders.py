@@ -13,15 +13,13 @@ from ...beyond_mocap.base.digest import byte_digest
 from ...beyond_mocap.base.errors import BeyondMocapError, InputError
 from ..core import channels
 from ..core.set_aside import drop, play_as_before
-from . import curve, keys, source
-from .carrier import MARK
+from . import curve, keys
+from .carrier import MARK, forget_sources, read_source, recheck_sources
 from .rigs import carrier_of
 from .settings import choose, riders, wishes
 
 _SAMPLES = 400
-MOST_FRAMES = 40_000
-"""Frames that a cycled motion lasts at most, some: worked out again while a path is dragged, more would take
-minutes."""
+MOST_FRAMES = 40_000  # of a cycled motion, about: worked out again while a path is dragged, more would take minutes
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +61,8 @@ _counted = 0
 def forget() -> None:
     """Nothing is remembered any more: another file is open."""
     _shown.clear()
-    source.forget()
+    forget_sources()
+    curve.forget_grounds()
     keys.forget()
 
 
@@ -94,29 +93,29 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     carrier.check()
     if anew:
         bpy.context.view_layer.update()
-        source.unsure()
+        recheck_sources()
         keys.refresh()
     settings, drawn = RideSettings(**wishes(ridden_by)), curve.read(scene, ridden_by.curve)
-    known = source.of(carrier, scene, settings)
-    ground = source.ground_digest(scene, ridden_by.ground)
+    known = read_source(carrier, scene, settings)
+    ground = curve.ground_digest(scene, ridden_by.ground)
     digest = byte_digest(known.digest, drawn.digest, ground, repr(settings)).hex()
     made = carrier.ours()[0]
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
         lines = _lines(scene, ridden_by, digest, _shown[body.session_uid][1])
-        _tell(ridden_by, lines, None)  # what was wrong meanwhile is so no more
+        tell(ridden_by, lines)  # what was wrong meanwhile is so no more
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
-    ridden = ride(known.core, path, settings, source.ground_of(scene, ridden_by.ground, ground))
+    ridden = ride(known.core, path, settings, curve.ground_of(scene, ridden_by.ground, ground))
     if anew or not up_to_date:
         carrier.write(scene, known.read, ridden, digest)
     _counted += 1
     first, fps = known.read.first, known.read.motion.fps
-    told = "\n".join((*drawn.notes, *source.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
+    told = "\n".join((*drawn.notes, *curve.ground_notes(ridden_by.ground), *known.read.told, *ridden.warnings))
     now = Shown(first, fps, known.core, path=path, ridden=ridden, number=_counted, told=told)
     _shown[body.session_uid] = digest, now
-    _tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
+    tell(ridden_by, _lines(scene, ridden_by, digest, now), _figures(known.core, ridden))
     return True
 
 
@@ -135,14 +134,11 @@ def _check_length(known, path, settings) -> None:
     """InputError where a motion would have to be repeated for ever."""
     if not settings.cycle or known.arc.length <= 0.0:
         return
-    line = _along(path)
-    metres = np.linalg.norm(np.diff(line, axis=0), axis=1).sum()
-    motion = known.motion
+    metres, motion = np.linalg.norm(np.diff(_along(path), axis=0), axis=1).sum(), known.motion
     frames = len(motion) * metres / known.arc.length / settings.speed
     if frames > MOST_FRAMES:
-        minutes = frames / motion.fps / 60.0
-        raise InputError("cycle", f"the motion would last {minutes:.0f} minutes on a path of {metres:.0f} m",
-                         f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
+        found = f"the motion would last {frames / motion.fps / 60.0:.0f} minutes on a path of {metres:.0f} m"
+        raise InputError("cycle", found, f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
                          "shorten the path, or switch Cycle off")
 
 
@@ -156,13 +152,12 @@ def begin(
 
     scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
     if ride.on:
-        raise InputError(
-            f"armature {body.name}", "it rides already", "one that does not", "edit its curve, or press Leave"
-        )
+        raise InputError(f"armature {body.name}", "it rides already", "one that does not",
+                         "edit its curve, or press Leave")
     carrier.check()
     context.view_layer.update()
-    source.unsure()
-    known = source.of(carrier, scene, RideSettings(**wishes(ride))).core
+    recheck_sources()
+    known = read_source(carrier, scene, RideSettings(**wishes(ride))).core
     before = ride.curve
     if drawn is None and not (straight or count) and before is not None and before.name in scene.objects:
         drawn = before
@@ -214,7 +209,7 @@ def new_curve(
         path, straight = curve.read(scene, before).path(), False
     else:
         settings = RideSettings(**wishes(ride))
-        path, straight = _own_path(source.of(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
+        path, straight = _own_path(read_source(carrier_of(body), scene, settings).core, shape == "STRAIGHT")
     made = curve.create(context, f"{body.name} path", path, straight=straight, count=count, kind=kind, degree=degree)
     try:
         change(scene, body, made)
@@ -223,10 +218,8 @@ def new_curve(
         raise
     ridden = any(rider.beyond_mocap_ride.curve == before for rider in riders(scene))
     if before is not None and before.get(curve.MARK) and not ridden:
-        name, data = before.name, before.data
-        bpy.data.objects.remove(before)
-        if not data.users:
-            bpy.data.curves.remove(data)
+        name = before.name
+        curve.remove_curve(before)
         made.name = made.data.name = name
     return made
 
@@ -271,8 +264,7 @@ def end(body: bpy.types.Object) -> None:
 
 
 def leave(*bodies: bpy.types.Object | None) -> list[str]:
-    """Riders among these play their originals again, because something else is to be done with them; a line for
-    each."""
+    """Riders among these play their originals again, for something else is to be done with them; a line for each."""
     riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
     for body in riding:
         may_end(body)
@@ -282,8 +274,7 @@ def leave(*bodies: bpy.types.Object | None) -> list[str]:
 
 
 def standing(body: bpy.types.Object | None):
-    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where that is not
-    known."""
+    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where not known."""
     now = shown(body) if body is not None else None
     if now is None:
         return None
@@ -324,21 +315,16 @@ def _own_path(known, straight: bool):
 def _figures(known, ridden) -> dict:
     """What a panel says of a result, in metres and seconds."""
     motion = ridden.motion
-    return {
-        "seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
-        "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3), "source_metres": round(float(known.arc.length), 3),
-        "seams": len(ridden.seams), "correction": round(float(np.percentile(ridden.correction, 95)), 4),
-        "miss": round(float(ridden.miss.max(initial=0.0)), 4),
-    }
+    return {"seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
+            "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3),
+            "source_metres": round(float(known.arc.length), 3), "seams": len(ridden.seams),
+            "correction": round(float(np.percentile(ridden.correction, 95)), 4),
+            "miss": round(float(ridden.miss.max(initial=0.0)), 4)}
 
 
-def tell(body: bpy.types.Object, line: str) -> None:
-    """Note for the panel why a rider could not follow."""
-    _tell(body.beyond_mocap_ride, line, None)
-
-
-def _tell(ride, lines: str, figures: dict | None) -> None:
-    """Write only what is new: each write is a change of the object, which is looked at again."""
+def tell(ride, lines: str, figures: dict | None = None) -> None:
+    """Note lines for the panel, such as why a rider could not follow, and figures. Only what is new is written: each
+    write is a change of the object, which is looked at again."""
     if ride.told != lines:
         ride.told = lines
     text = json.dumps(figures) if figures is not None else ride.figures

@@ -52,10 +52,9 @@ def channel_of(mode: str) -> str:
 def turns(mode: str, values: np.ndarray) -> np.ndarray:
     """Rotations (F, 4) of the values (F, n) of `channel_of` a rotation mode."""
     if mode == "QUATERNION":
-        return quaternion.normalized(np.where(np.any(values, axis=1, keepdims=True), values, [1.0, 0.0, 0.0, 0.0]))
+        return quaternion.normalized(values)
     if mode == "AXIS_ANGLE":
-        axis = values[:, 1:]
-        return quaternion.about_axis(unit_vectors(axis), values[:, 0])
+        return quaternion.about_axis(unit_vectors(values[:, 1:]), values[:, 0])
     order = mode[::-1]  # Blender names the axes in the order in which they are applied to a point
     return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)
 
@@ -100,16 +99,14 @@ def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, other
             shown.pose.bones.foreach_get(name, table[row].reshape(-1))
         lies[row], basis[row] = np.array(shown.matrix_world), np.array(shown.matrix_basis)
         for path, rows in more.items():
-            rows.append(_numbers(shown.path_resolve(path)))
+            rows.append(numbers_of(shown.path_resolve(path)))
     modes = [bone.rotation_mode for bone in rig.pose.bones]
-    return Look(
-        np.asarray(frames, float), lies, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float), modes=modes,
-        channels={name: table.astype(float) for name, table in channels.items()},
-        others={path: np.array(rows, float).reshape(count, -1) for path, rows in more.items()},
-    )  # fmt: skip
+    return Look(np.asarray(frames, float), lies, basis, bones=bones, poses=poses.swapaxes(-1, -2).astype(float),
+                modes=modes, channels={name: table.astype(float) for name, table in channels.items()},
+                others={path: np.array(rows, float).reshape(count, -1) for path, rows in more.items()})
 
 
-def _numbers(value) -> list[float]:
+def numbers_of(value) -> list[float]:
     """A property's value as numbers."""
     try:
         return [float(one) for one in value]

@@ -17,18 +17,16 @@ from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, pose_kinematics
 from ...beyond_mocap.motion.skeleton import Skeleton
 from ..rigs import bone_maps
-from ..rigs.driven import upright_turn
-from ..rigs.followers import list_followers
+from ..rigs.driven import list_followers, upright_turn
 from .rig_look import Look
 
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
 _STRETCH, _OFF = 1e-3, 3e-4  # metres
 _UPRIGHT = 0.64  # cosine of the angle between a standing body's trunk and the vertical, at most
-_CARRIERS = {
-    "neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
-    "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
-    "toe": ("foot",),
-}  # fmt: skip
+_FK_LIKE = re.compile(r"(?i)(?<![a-z])(fk|ctrl|control)(?![a-z])")
+_CARRIERS = {"neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
+             "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
+             "toe": ("foot",)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,18 +69,11 @@ def _shown(rig: bpy.types.Object, control: str) -> str:
     if own.use_deform and not _FK_LIKE.search(control):
         return control
     near = _SAME * _size(rig)
-    fits = [
-        bone
-        for bone in bones
-        if (bone.head_local - own.head_local).length < near and bone.name != control
-        and bone.vector.length and _direction(bone).dot(_direction(own)) > _ALONG
-        and (bone.use_deform or bone.name.startswith("ORG-"))
-    ]  # fmt: skip
+    fits = [bone for bone in bones if (bone.head_local - own.head_local).length < near and bone.name != control
+            and bone.vector.length and _direction(bone).dot(_direction(own)) > _ALONG
+            and (bone.use_deform or bone.name.startswith("ORG-"))]
     fits.sort(key=lambda bone: (not bone.name.startswith("ORG-"), len(bone.parent_recursive)))
     return fits[0].name if fits else control
-
-
-_FK_LIKE = re.compile(r"(?i)(?<![a-z])(fk|ctrl|control)(?![a-z])")
 
 
 def _direction(bone: bpy.types.Bone):
@@ -139,9 +130,9 @@ def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps
             back = quaternion.inverse(world[:, parent])
             local[:, joint] = quaternion.multiply(back, world[:, joint])
             offsets[joint] = _constant(quaternion.rotate(back, places[:, joint] - places[:, parent]))
-    ends, tips = _tips(
-        rig, parts, parents, rest=rest, seen=seen, units=units,
-    ) if parts.humanoid else ((), np.zeros((0, 3)))
+    ends, tips = (), np.zeros((0, 3))
+    if parts.humanoid:
+        ends, tips = _tips(rig, parts, parents, rest=rest, seen=seen, units=units)
     joints = tuple(bone_maps.JOINTS.get(name, f"Bone {name}") for name in names)
     skeleton, local = Skeleton(joints, tuple(parents), offsets, ends, tips), quaternion.continuous(local)
     if parts.humanoid:
@@ -234,7 +225,3 @@ def whole(rig: bpy.types.Object, seen: Look, object_keyed: bool, units: float) -
     shown = {"body": main} | ({"lowest": lowest} if lowest != main else {})
     return Parts({}, shown, {}, trunk={}, root="", humanoid=False)
 
-
-def is_root(rig: bpy.types.Object, parts: Parts) -> bool:
-    """Whether the hips are the topmost bone."""
-    return rig.data.bones[parts.controls["hips"]].parent is None

@@ -94,11 +94,11 @@ class Rows:
 
     def numbers(self, name, table: np.ndarray) -> np.ndarray:
         """A table (F, ...) of numbers there; name: anything that is its own."""
-        return self.remembered(name, lambda: self._numbers(table))
+        return self.remembered(name, lambda: self._at(table, self._mixed))
 
     def turns(self, name, table: np.ndarray) -> np.ndarray:
         """A table (F, 4) of rotations there."""
-        return self.remembered(name, lambda: self._turns(table))
+        return self.remembered(name, lambda: self._at(table, lambda a, b: quaternion.slerp(a, b, self.weight)))
 
     def remembered(self, name, made) -> np.ndarray:
         """What was made under this name, or what `made` makes."""
@@ -106,28 +106,24 @@ class Rows:
             self.known[name] = made()
         return self.known[name]
 
-    def _numbers(self, table: np.ndarray) -> np.ndarray:
+    def _at(self, table: np.ndarray, blend) -> np.ndarray:
+        """A table there; blend(before, after) where it is between two of its rows."""
         if self.same:
             return table
         if self.whole:
             return table[self.low]
-        weight = self.weight.reshape(-1, *[1] * (table.ndim - 1))
-        return (1.0 - weight) * table[self.low] + weight * table[np.minimum(self.low + 1, len(table) - 1)]
+        return blend(table[self.low], table[np.minimum(self.low + 1, len(table) - 1)])
 
-    def _turns(self, table: np.ndarray) -> np.ndarray:
-        if self.same:
-            return table
-        if self.whole:
-            return table[self.low]
-        return quaternion.slerp(table[self.low], table[np.minimum(self.low + 1, len(table) - 1)], self.weight)
+    def _mixed(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        weight = self.weight.reshape(-1, *[1] * (before.ndim - 1))
+        return (1.0 - weight) * before + weight * after
 
 
 class Carried:
     """A rig that has been looked at: what its controls are, and what they have to be."""
 
     def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool,
-                 motion: Motion,
-                 units: float):
+                 motion: Motion, units: float):
         """motion: what the parts show. object_keyed: whether the object itself is animated."""
         self.seen, self.parts, self.motion, self.units = seen, parts, motion, units
         self.joint = {part: number for number, part in enumerate(parts.shown)}

@@ -12,8 +12,10 @@ from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..core.measure import frames_per_second, units_per_metre
 from ..rigs import control_study
-from ..rigs.posing import CHANNELS
+from ..rigs.control_study import CHANNELS
 from . import rig_look, rig_parts
+from .carrier import no_motion
+from .keys import columns
 from .rig_look import channel_of
 from .rig_ride import OBJECT, Carried, Rows, channel_values
 
@@ -71,21 +73,19 @@ class RigSource:
         return self._rows
 
     def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
-        """A channel's values (N,) in the source on the source's frames that are shown; None where it was not looked
-        at."""
+        """A channel's values (N,) in the source on its frames that are shown; None where it was not looked at."""
         return rows.remembered((path, index), lambda: self._own(path, index, rows))
 
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
-            return (
-                table[rows.low] if np.array_equal(table, np.round(table)) else rows.numbers((path, index, "is"), table)
-            )
-        match = BONE.match(path)
-        if match is None or match[2] not in CHANNELS or bpy.utils.unescape_identifier(match[1]) not in self.seen.bones:
+            steps = np.array_equal(table, np.round(table))
+            return table[rows.low] if steps else rows.numbers((path, index, "is"), table)
+        bone, channel = posed_bone(path), path.rpartition(".")[2]
+        if bone not in self.seen.bones:
             return None
-        table = self.seen.channels[match[2]][:, self.seen.number(bpy.utils.unescape_identifier(match[1]))]
-        if match[2] == "rotation_quaternion":
+        table = self.seen.channels[channel][:, self.seen.number(bone)]
+        if channel == "rotation_quaternion":
             table = quaternion.continuous(table)
         return rows.numbers((path, index, "is"), table[:, index])
 
@@ -115,11 +115,6 @@ class RigSource:
         return columns("location", location) | columns(channel_of(mode), channel_values(mode, turned, table[0]))
 
 
-def columns(path: str, values: np.ndarray) -> dict[tuple[str, int], np.ndarray]:
-    """Values (N, n) of a property, one channel each."""
-    return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
-
-
 class Played:
     """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object
     and its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches:
@@ -138,9 +133,7 @@ class Played:
             found |= own
             ends.append(extent or channels.keyed_range(own))
         if not found:
-            raise InputError(
-                f"armature {rig.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise no_motion(rig)
         first = int(np.ceil(min(a for a, _ in ends) - 1e-4))
         last = int(np.floor(max(b for _, b in ends) + 1e-4))
         if any(_cycles(curve) for curve in found.values()):
@@ -148,17 +141,14 @@ class Played:
             self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
         if not 1 <= last - first < _MOST:
             raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}",
-                             f"2 to {_MOST} frames",
-                             "key more than one frame")
+                             f"2 to {_MOST} frames", "key more than one frame")
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)
         paths = {path for path, _ in found}
-        self.others = {path for path in paths if not _is_posed(path) and _resolves(rig, path)}
-        self.places = {place for place in found if _is_posed(place[0]) or place[0] in self.others}
+        self.others = {path for path in paths if posed_bone(path) is None and _resolves(rig, path)}
+        self.places = {place for place in found if posed_bone(place[0]) is not None or place[0] in self.others}
         self.switches = any(path not in _OBJECT for path in self.others)
-        self.bones = {
-            bpy.utils.unescape_identifier(m[1]) for path in paths if (m := BONE.match(path)) and m[2] in CHANNELS
-        }
+        self.bones = {bone for path in paths if (bone := posed_bone(path)) is not None}
         self.object_keyed = bool(_OBJECT & paths)
 
 
@@ -183,15 +173,15 @@ def _cycles(curve: bpy.types.FCurve) -> bool:
     return any(one.type == "CYCLES" and not one.mute for one in curve.modifiers)
 
 
-def _is_posed(path: str) -> bool:
+def posed_bone(path: str) -> str | None:
+    """The bone whose place, turn or size a data path is; None for other paths."""
     match = BONE.match(path)
-    return bool(match and match[2] in CHANNELS)
+    return bpy.utils.unescape_identifier(match[1]) if match and match[2] in CHANNELS else None
 
 
 def _resolves(rig: bpy.types.Object, path: str) -> bool:
     try:
-        value = rig.path_resolve(path)
-        rig_look._numbers(value)
+        rig_look.numbers_of(rig.path_resolve(path))
     except (ValueError, TypeError):
         return False
     return True
@@ -220,10 +210,5 @@ def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Playe
 
 def _driven(rig: bpy.types.Object) -> set[str]:
     """Bones whose place or turn a driver sets."""
-    data = rig.animation_data
-    found = set()
-    for driver in data.drivers if data is not None else ():
-        match = BONE.match(driver.data_path)
-        if match and match[2] in CHANNELS and not driver.mute:
-            found.add(bpy.utils.unescape_identifier(match[1]))
-    return found
+    drivers = rig.animation_data.drivers if rig.animation_data is not None else ()
+    return {bone for one in drivers if not one.mute and (bone := posed_bone(one.data_path)) is not None}

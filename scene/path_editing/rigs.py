@@ -21,9 +21,9 @@ from ..core.measure import frames_per_second, units_per_metre
 from ..core.set_aside import play_as_before, put_aside, stance_of, stand
 from ..rigs import armature
 from ..rigs.bone_curves import is_carried
-from ..rigs.posing import CHANNELS
+from ..rigs.control_study import CHANNELS
 from . import keys, rig_parts
-from .carrier import MARK, Carrier, PlainCarrier, Read
+from .carrier import MARK, Carrier, PlainCarrier, Read, check_finite, no_motion
 from .rig_source import BONE, RigSource, layered, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
@@ -47,9 +47,7 @@ class RigCarrier(Carrier):
         if self.body.type != "ARMATURE" or not len(self.body.data.bones):
             raise InputError(f"armature {self.body.name}", "no bones", "an armature with bones")
         if not self.ride.on and self.source()[0] is None and not playing_strips(self.body):
-            raise InputError(
-                f"armature {self.body.name}", "it plays no action", "a motion", "import one, or choose an action"
-            )
+            raise no_motion(self.body)
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
         body = self.body
@@ -58,7 +56,9 @@ class RigCarrier(Carrier):
         form = [frames_per_second(scene), units_per_metre(scene), [bone.rotation_mode for bone in body.pose.bones]]
         form += [[one.type, one.mute, getattr(one, "subtarget", ""), getattr(one, "target", None) and one.target.name]
                  for bone in body.pose.bones for one in bone.constraints]
-        thing = body if not self._object_keyed() else body.parent
+        original, slot = self.source()
+        found = channels.curves(original, slot) if slot is not None else {}
+        thing = body.parent if any(not path.startswith("pose.") for path, _ in found) else body
         while thing is not None:
             if thing is body or thing.animation_data is None:
                 form.append([thing.name, [list(row) for row in thing.matrix_basis]])
@@ -78,8 +78,7 @@ class RigCarrier(Carrier):
         armature.placement(self.body, scene)  # an uneven scale turns bones askew
         with self._original():
             rig = RigSource(self.body, scene)
-        if not (np.isfinite(rig.motion.root_positions).all() and np.isfinite(rig.motion.rotations).all()):
-            raise InputError(f"armature {self.body.name}", "a pose that is no number", "numbers", "look at its keys")
+        check_finite(self.body, rig.motion)
         return RigRead(rig.motion, rig.start, None, tuple(rig.told), rig)
 
     def begin(self) -> None:
@@ -135,11 +134,6 @@ class RigCarrier(Carrier):
             return []
         return playing_strips(self.body, aside=self.ride.on)
 
-    def _object_keyed(self) -> bool:
-        original, slot = self.source()
-        found = channels.curves(original, slot) if slot is not None else {}
-        return any(not path.startswith("pose.") for path, _ in found)
-
     @contextmanager
     def _original(self):
         """The armature as it was before it rode, for the length of a `with`."""
@@ -159,8 +153,7 @@ class RigCarrier(Carrier):
             stand(body, json.loads(before.stance))
             yield
         finally:
-            data.action = mine[0]
-            data.action_slot = mine[1]
+            data.action, data.action_slot = mine[:2]
             data.use_nla, data.action_influence, data.action_blend_type, data.action_extrapolation = mine[2:]
             stand(body, now)
             body.update_tag(refresh={"OBJECT", "DATA", "TIME"})
@@ -190,13 +183,16 @@ def is_plain(body: bpy.types.Object) -> bool:
     if any(driver.data_path.startswith("pose.") for driver in data.drivers):
         return False
     roots = [bone for bone in body.data.bones if bone.parent is None]
-    if len(roots) > 1 or any(not _inherits(bone) for bone in body.data.bones if bone.parent is not None):
+    if len(roots) > 1 or not all(
+        bone.use_inherit_rotation and bone.inherit_scale == "FULL" and bone.use_local_location
+        for bone in body.data.bones if bone.parent is not None
+    ):
         return False
     if any(_out_of_joint(bone, 1e-4 * body.dimensions.length) for bone in bones):
         return False
     action, slot = channels.playing(body)
     found = channels.curves(action, slot) if action is not None else {}
-    top = _path(roots[0].name) if roots else ""
+    top = f'pose.bones["{bpy.utils.escape_identifier(roots[0].name)}"].location' if roots else ""
     for (path, _), curve in found.items():
         if curve.mute or curve.modifiers:
             return False
@@ -205,15 +201,7 @@ def is_plain(body: bpy.types.Object) -> bool:
         if (moves or posed is not None and posed[2] == "scale") and _varies(curve):
             return False
     humanoid = rig_parts.of_rig(body)
-    return humanoid is not None and rig_parts.is_root(body, humanoid)
-
-
-def _path(bone: str) -> str:
-    return f'pose.bones["{bpy.utils.escape_identifier(bone)}"].location'
-
-
-def _inherits(bone: bpy.types.Bone) -> bool:
-    return bone.use_inherit_rotation and bone.inherit_scale == "FULL" and bone.use_local_location
+    return humanoid is not None and body.data.bones[humanoid.controls["hips"]].parent is None
 
 
 def _out_of_joint(bone: bpy.types.PoseBone, least: float) -> bool:

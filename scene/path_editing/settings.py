@@ -11,16 +11,6 @@ from ..core.properties import property_values, with_settings
 from ..result.result import BeyondMocapBefore
 
 
-def is_curve(_ride, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as the new path."""
-    return candidate.type == "CURVE"
-
-
-def is_mesh(_ride, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as the ground."""
-    return candidate.type == "MESH"
-
-
 def follow_pick(ride, context: bpy.types.Context) -> None:
     """Where a curve is active that nobody rides any more, the one that was picked instead becomes active."""
     active = context.view_layer.objects.active if context.view_layer is not None else None
@@ -48,25 +38,19 @@ class BeyondMocapRide(bpy.types.PropertyGroup):
     attached_to = ("Object.beyond_mocap_ride",)
 
     on: BoolProperty(name="Rides", description="Whether the armature's motion rides a curve")
-    curve: PointerProperty(
-        name="New Path", type=bpy.types.Object, poll=is_curve, update=follow_pick,
-        description="The curve object that the motion rides",
-    )
+    curve: PointerProperty(name="New Path", type=bpy.types.Object, poll=lambda _, thing: thing.type == "CURVE",
+                           update=follow_pick, description="The curve object that the motion rides")
     before: PointerProperty(type=BeyondMocapBefore, description="The original motion, put aside")
-    added: FloatProperty(
-        name="Added", options={"HIDDEN"}, description="Seconds of the delay that keep it apart from others"
-    )
+    added: FloatProperty(name="Added", options={"HIDDEN"},
+                         description="Seconds of the delay that keep it apart from others")
     detours: StringProperty(
         name="Detours", default="[]",
         description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",
     )
-    agreed: StringProperty(
-        name="Agreed", options={"HIDDEN"}, description="Digest of what it was when riders were asked to keep apart"
-    )
-    ground: PointerProperty(
-        name="Ground", type=bpy.types.Object, poll=is_mesh,
-        description="A mesh whose surface the feet follow; none: the height of the path itself",
-    )
+    agreed: StringProperty(name="Agreed", options={"HIDDEN"},
+                           description="Digest of what it was when riders were asked to keep apart")
+    ground: PointerProperty(name="Ground", type=bpy.types.Object, poll=lambda _, thing: thing.type == "MESH",
+                            description="A mesh whose surface the feet follow; none: the height of the path itself")
     told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the result as JSON")
 

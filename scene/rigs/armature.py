@@ -1,4 +1,4 @@
-"""Skeletons as armatures, and armatures as skeletons.
+"""Skeletons as armatures, and armatures as skeletons; an armature copied with all that hangs on it.
 
 A joint becomes a bone of the same name whose head is the joint. The core's joints have no rotation at rest, Blender's
 bones point somewhere: `rest_rotations` is the difference, and the only thing `action` needs to translate poses.
@@ -7,6 +7,7 @@ bones point somewhere: `rest_rotations` is the difference, and the only thing `a
 from __future__ import annotations
 
 import json
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import bpy
@@ -66,7 +67,10 @@ def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection
                 bone.parent = data.edit_bones[skeleton.names[skeleton.parents[joint]]]
     for bone in body.pose.bones:
         bone.rotation_mode = "QUATERNION"
-    data[PROPERTY] = json.dumps(_as_table(skeleton, units))
+    data[PROPERTY] = json.dumps({
+        "names": skeleton.names, "parents": skeleton.parents, "offsets": skeleton.offsets.tolist(),
+        "end_parents": skeleton.end_parents, "end_offsets": skeleton.end_offsets.tolist(), "units_per_metre": units,
+    })
     if collection is not None and collection != scene.collection:
         collection.objects.link(body)
         scene.collection.objects.unlink(body)
@@ -117,26 +121,22 @@ def rest_rotations(body: bpy.types.Object, names: tuple[str, ...]) -> np.ndarray
     return quaternion.from_matrix(np.array([body.data.bones[name].matrix_local.to_3x3() for name in names]))
 
 
-class _editing:
+@contextmanager
+def _editing(context: bpy.types.Context, body: bpy.types.Object):
     """Edit mode on one armature for the length of a `with`; the active object and its mode come back afterwards."""
-
-    def __init__(self, context, body):
-        self.context, self.body = context, body
-
-    def __enter__(self):
-        objects = self.context.view_layer.objects
-        self.before = objects.active
-        self.mode = self.before.mode if self.before is not None else "OBJECT"
-        if self.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode="OBJECT")
-        objects.active = self.body
-        bpy.ops.object.mode_set(mode="EDIT")
-
-    def __exit__(self, *error):
+    before = context.view_layer.objects.active
+    mode = before.mode if before is not None else "OBJECT"
+    if mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
-        self.context.view_layer.objects.active = self.before
-        if self.mode != "OBJECT":
-            bpy.ops.object.mode_set(mode=self.mode)
+    context.view_layer.objects.active = body
+    bpy.ops.object.mode_set(mode="EDIT")
+    try:
+        yield
+    finally:
+        bpy.ops.object.mode_set(mode="OBJECT")
+        context.view_layer.objects.active = before
+        if mode != "OBJECT":
+            bpy.ops.object.mode_set(mode=mode)
 
 
 def _tails(skeleton: Skeleton) -> np.ndarray:
@@ -147,11 +147,7 @@ def _tails(skeleton: Skeleton) -> np.ndarray:
         mean = onward.mean(axis=0) if len(onward) else np.zeros(3)
         if np.linalg.norm(mean) < 0.25 * STUB and len(onward):
             mean = max(onward, key=np.linalg.norm)
-        length = np.linalg.norm(mean)
-        if length < 1e-4:
-            mean, length = _incoming(skeleton, joint), 1.0
-            mean = mean * STUB
-        tails[joint] = mean
+        tails[joint] = mean if np.linalg.norm(mean) >= 1e-4 else STUB * _incoming(skeleton, joint)
     return tails
 
 
@@ -181,17 +177,6 @@ def _roll_target(tail: np.ndarray) -> Vector:
     return Vector((0.0, 0.0, 1.0)) if forward else Vector((1.0, 0.0, 0.0))
 
 
-def _as_table(skeleton: Skeleton, units: float) -> dict:
-    return {
-        "names": skeleton.names,
-        "parents": skeleton.parents,
-        "offsets": skeleton.offsets.tolist(),
-        "end_parents": skeleton.end_parents,
-        "end_offsets": skeleton.end_offsets.tolist(),
-        "units_per_metre": units,
-    }
-
-
 def _kept(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton | None:
     """The skeleton stored by `create`, as large as the object is now; None where there is none or it is damaged."""
     try:
@@ -219,3 +204,48 @@ def _from_bones(body: bpy.types.Object, scene: bpy.types.Scene) -> Skeleton:
     tips = [i for i, bone in enumerate(bones) if not bone.children]
     offsets = heads - heads[np.maximum(parents, 0)]
     return Skeleton(tuple(names), tuple(parents), offsets, tuple(tips), (tails - heads)[tips])
+
+
+def copy_rig(rig: bpy.types.Object, name: str) -> bpy.types.Object:
+    """A copy of an armature object and of its children, which share their data with the original; beside it in its
+    collections, or in the scene's own where these are another file's. What pointed to the original within them points
+    to the copy; the copy plays nothing."""
+    family = [rig, *rig.children_recursive]
+    twins = {one: one.copy() for one in family}
+    for one, twin in twins.items():
+        twin.name = name if one == rig else f"{name} {one.name}"
+        for collection in _open_to(one):
+            collection.objects.link(twin)
+        if one.parent in twins:
+            inverse = one.matrix_parent_inverse.copy()
+            twin.parent, twin.matrix_parent_inverse = twins[one.parent], inverse
+        _repoint(twin, twins)
+    data = twins[rig].animation_data
+    if data is not None:
+        data.action = None
+        for track in list(data.nla_tracks):
+            data.nla_tracks.remove(track)
+    return twins[rig]
+
+
+def _open_to(thing: bpy.types.Object) -> list[bpy.types.Collection]:
+    """The collections of an object that take another one: not linked ones, nor those of a library override."""
+    found = [one for one in thing.users_collection if one.library is None and one.override_library is None]
+    return found or [bpy.context.scene.collection]
+
+
+def _repoint(thing: bpy.types.Object, twins: dict) -> None:
+    holders = [*thing.constraints, *thing.modifiers]
+    if thing.pose is not None:
+        holders += [constraint for bone in thing.pose.bones for constraint in bone.constraints]
+    for holder in holders:
+        targets = list(getattr(holder, "targets", ())) or []
+        for one in (holder, *targets):
+            for pointer in ("target", "pole_target", "object", "space_object"):
+                if getattr(one, pointer, None) in twins:
+                    setattr(one, pointer, twins[getattr(one, pointer)])
+    for driver in thing.animation_data.drivers if thing.animation_data else ():
+        for variable in driver.driver.variables:
+            for target in variable.targets:
+                if target.id in twins:
+                    target.id = twins[target.id]

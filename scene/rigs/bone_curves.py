@@ -1,4 +1,4 @@
-"""Where a rig's driven bones have to be at each frame to show a motion, and the curves of their channels.
+"""Where a rig's driven bones, or an exported root, have to be at each frame; the curves of the bones' channels.
 
 With S the turn and size from the armature's space to the core's skeleton, O the object's turn in the scene, W_j the
 core's world rotation of a joint and R_j its bone's rotation at rest, the bone has to be at O^-1 W_j S R_j.
@@ -11,14 +11,17 @@ import numpy as np
 
 from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion, forward_kinematics
-from ..core.measure import units_per_metre
-from . import armature
-from .driven import Driven
+from ..core.measure import frames_per_second, units_per_metre
+from ..path_editing import keys
+from ..path_editing.rig_look import channel_of
+from . import armature, bone_maps
+from .driven import Driven, upright_axes
+
+ROOT_BONE = "root"  # of a copy whose rig has none
 
 
 def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
-    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that the driven bones are to have, and lines
-    told."""
+    """Rotations (F, 3, 3) and heads (F, 3) in the armature's space that driven bones are to have, and lines told."""
     heads, world = forward_kinematics(motion)
     hips = heads[:, driven.parts.index("hips")]
     told = []
@@ -28,9 +31,7 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
         back = quaternion.multiply(root_turn[:1], quaternion.inverse(root_turn))
         world = quaternion.multiply(back[:, None], world)
         hips = quaternion.rotate(back, hips - root_place) + root_place[:1]
-        root_turn, root_place = np.repeat(root_turn[:1], len(hips), axis=0), np.repeat(
-            root_place[:1], len(hips), axis=0
-        )
+        root_turn, root_place = (np.repeat(values[:1], len(hips), axis=0) for values in (root_turn, root_place))
     if root in ("SMOOTH", "STRAIGHT") and "root" not in driven.table:
         told.append("no root bone: the hips carry all of the motion; Export Motion can add one to a copy")
     lie_turn, lie_origin = placements(driven.rig, driven.scene, frames)
@@ -130,21 +131,11 @@ def bone_curves(rig: bpy.types.Object, basis: dict) -> dict[str, tuple[str, np.n
         if location is not None:
             found[f"{path}.location"] = (name, location)
         if mode == "QUATERNION":
-            if rotation[0, 0] < 0:
-                rotation = -rotation
-            found[f"{path}.rotation_quaternion"] = (name, rotation)
-        elif mode == "AXIS_ANGLE":
-            found[f"{path}.rotation_axis_angle"] = (name, _axis_angles(rotation))
+            values = -rotation if rotation[0, 0] < 0 else rotation
         else:
-            found[f"{path}.rotation_euler"] = (name, _euler_curves(rotation, mode))
+            values = keys.rotation(mode, rotation) if mode == "AXIS_ANGLE" else _euler_curves(rotation, mode)
+        found[f"{path}.{channel_of(mode)}"] = (name, values)
     return found
-
-
-def _axis_angles(rotation: np.ndarray) -> np.ndarray:
-    """Angle and axis (F, 4) of sign-continuous rotations (F, 4)."""
-    length = np.linalg.norm(rotation[:, 1:], axis=1)
-    axis = np.where(length[:, None] > 1e-9, rotation[:, 1:] / np.maximum(length, 1e-9)[:, None], [0.0, 1.0, 0.0])
-    return np.column_stack([2.0 * np.arctan2(length, rotation[:, 0]), axis])
 
 
 def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
@@ -159,10 +150,7 @@ def _euler_curves(rotation: np.ndarray, mode: str) -> np.ndarray:
         choices = [a - 2.0 * np.pi * np.round((a - last) / (2.0 * np.pi)) for a in (first, other)]
         last = min(choices, key=lambda a: np.abs(a - last).sum())
         out[frame] = last
-    found = np.empty_like(out)
-    for column, letter in enumerate(order):
-        found[:, "XYZ".index(letter)] = out[:, column]
-    return found
+    return out[:, [order.index(letter) for letter in "XYZ"]]
 
 
 def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.ndarray]]:
@@ -177,3 +165,43 @@ def setting_curves(driven: Driven, bakes_ik: bool) -> dict[str, tuple[str, np.nd
                     f'.constraints["{bpy.utils.escape_identifier(one.constraint)}"].influence')
             found[path] = (one.bone, np.array([[0.0]]))
     return found
+
+
+def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
+    """Hips, root bone (None: it has none), the root's way (F, 4, 4) and what brings everything back to where it began
+    (F, 4, 4); both None where they are not asked for. shown, wanted: of `export`."""
+    if wanted.root == "KEEP":
+        return None, None, None, None
+    from ...beyond_mocap.motion.path.root_path import ground_path
+
+    table = bone_maps.kept(rig) or bone_maps.suggest(rig)
+    at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
+    world = shown.lies[:, None] @ shown.poses[:, list(at.values())]
+    legs = world[:, :, :3, 3]
+    across = legs[:, 0] - legs[:, 1]
+    facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
+    units, rate = units_per_metre(bpy.context.scene), wanted.rate or frames_per_second(bpy.context.scene)
+    place, yaw = ground_path(legs.mean(axis=1)[:, :2] / units, facing, rate,
+                             "straight" if wanted.root == "STRAIGHT" else "smooth")
+    way = np.tile(np.eye(4), (len(yaw), 1, 1))
+    way[:, :3, :3] = quaternion.to_matrix(quaternion.about_up(yaw))
+    way[:, :2, 3] = place * units
+    inward = np.linalg.inv(shown.lies)
+    own = table.get("root")
+    if wanted.root == "IN_PLACE":
+        return table["hips"], own, None, inward @ way[:1] @ np.linalg.inv(way) @ shown.lies
+    if own is not None:
+        rest = np.array(rig.data.bones[own].matrix_local)
+        return table["hips"], own, inward @ way @ _standing(rig, table) @ rest, None
+    told.append(f"{rig.name} has no root bone: one named {ROOT_BONE!r} was added to the copy in the file")
+    return table["hips"], None, inward @ way @ _standing(rig, table), None
+
+
+def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
+    """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
+    heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
+    axes, out = upright_axes(heads), np.eye(4)
+    hips, up = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"]), axes[2]
+    turn = out[:3, :3] = axes * np.cbrt(abs(np.linalg.det(np.array(rig.matrix_world.to_3x3()))))
+    out[:3, 3] = -turn @ (hips - (hips @ up) * up)
+    return out

@@ -21,16 +21,11 @@ from ...beyond_mocap.motion.skeleton import Skeleton
 from ..core.preferences import EXTENSION
 
 SPINES, NECKS = 6, 3
-_LIMB = {
-    "shoulder": "Shoulder", "upper_arm": "Arm", "lower_arm": "ForeArm", "hand": "Hand",
-    "upper_leg": "UpLeg", "lower_leg": "Leg", "foot": "Foot", "toe": "ToeBase",
-}
-JOINTS = {
-    "hips": "Hips",
-    **{f"spine {i}": f"Spine{i}" for i in range(1, SPINES + 1)},
-    "neck": "Neck", **{f"neck {i}": f"NeckTop{i}" for i in range(2, NECKS + 1)}, "head": "Head",
-    **{f"{side} {part}": side.capitalize() + name for side in ("left", "right") for part, name in _LIMB.items()},
-}
+_LIMB = {"shoulder": "Shoulder", "upper_arm": "Arm", "lower_arm": "ForeArm", "hand": "Hand", "upper_leg": "UpLeg",
+         "lower_leg": "Leg", "foot": "Foot", "toe": "ToeBase"}
+JOINTS = {"hips": "Hips", **{f"spine {i}": f"Spine{i}" for i in range(1, SPINES + 1)}, "neck": "Neck",
+          **{f"neck {i}": f"NeckTop{i}" for i in range(2, NECKS + 1)}, "head": "Head",
+          **{f"{side} {part}": side.capitalize() + name for side in ("left", "right") for part, name in _LIMB.items()}}
 """Part -> the name of its joint, which the core knows the meaning of."""
 PARTS = ("root", *JOINTS)
 LEGS = tuple(f"{side} {part}" for side in ("left", "right") for part in ("upper_leg", "lower_leg", "foot"))

@@ -15,8 +15,7 @@ import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
-from .control_study import RIDES, STATIC, TRIALS, nearest_carrier, place_spread, split_poses, turn_spread
-from .posing import PosedRig
+from .control_study import RIDES, STATIC, TRIALS, PosedRig, nearest_carrier, place_spread, split_poses, turn_spread
 
 _TURN = 0.7
 _TO_FK, _FROM_FK = re.compile(r"(?i)ik.*fk"), re.compile(r"(?i)fk.*ik")

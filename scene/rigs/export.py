@@ -16,22 +16,20 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.vectors import nearest_axis
 from ...beyond_mocap.files.whole import beside
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from ..core.measure import frames_per_second, units_per_metre
+from ..core.measure import frames_per_second
 from ..core.set_aside import scene_aside
-from . import bone_maps
+from .bone_curves import ROOT_BONE, root_motion
+from .fit import evaluated, extent
 
 SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 _OPERATORS = {"FBX": ("export_scene", "fbx"), "GLB": ("export_scene", "gltf"), "USD": ("wm", "usd_export")}
 _FBX_AXES = {"BLENDER": ("-Z", "Y"), "UNITY": ("-Z", "Y"), "GODOT": ("-Z", "Y"), "UNREAL": ("Y", "Z")}
 _USD_AXES = {"UNITY": ("NEGATIVE_Z", "Y"), "GODOT": ("NEGATIVE_Z", "Y")}
-ROOT_BONE = "root"
 _EVEN = 1e-4  # scale that is none
-HIDDEN = {"hide_viewport", "hide_render"}
-"""What is keyed on a mesh that is there for a part of the time only."""
+HIDDEN = {"hide_viewport", "hide_render"}  # what is keyed on a mesh that is there for a part of the time only
 
 
 @dataclass(frozen=True)
@@ -49,8 +47,7 @@ class Wanted:
 
 @dataclass(frozen=True, eq=False)
 class _Shown:
-    """What Blender shows of an armature: bones' poses (F, B, 4, 4) in its space, the object's (F, 4, 4) in the
-    world."""
+    """What Blender shows: bones' poses (F, B, 4, 4) in the armature's space, the object's (F, 4, 4) in the world."""
 
     bones: list[str]
     poses: np.ndarray
@@ -107,30 +104,10 @@ def check(format: str) -> None:
                          "choose another format, or switch the exporter's add-on on") from None
 
 
-def extent(rigs: list[bpy.types.Object]) -> tuple[float, float]:
-    """First and last scene frame of what the armatures play; InputError where one plays nothing."""
-    ends = []
-    for rig in rigs:
-        data = rig.animation_data
-        own = []
-        playing, slot = channels.playing(rig)
-        if playing is not None:
-            found = channels.keyed_range(channels.curves(playing, slot))
-            own += [found] if found else []
-        own += [(s.frame_start, s.frame_end) for t in (data.nla_tracks if data and data.use_nla else ())
-                if not t.mute for s in t.strips if not s.mute]
-        if not own:
-            raise InputError(f"armature {rig.name}", "it does not move", "an action or NLA strips",
-                             "bake or accept a motion first")
-        ends += own
-    return min(a for a, _ in ends), max(b for _, b in ends)
-
-
 def _look(
     scene: bpy.types.Scene, rigs: list[bpy.types.Object], times: np.ndarray, things: list[bpy.types.Object]
 ) -> dict[str, _Shown]:
-    """What Blender shows of the armatures, and of things without bones, at scene frames (F,), whole or not; the frame
-    comes back."""
+    """What Blender shows of armatures and things without bones at scene frames (F,), whole or not."""
     now, subframe = scene.frame_current, scene.frame_subframe
     names = {rig.name: [bone.name for bone in rig.data.bones] for rig in rigs}
     poses = {rig.name: np.empty((len(times), len(names[rig.name]), 4, 4), np.float32) for rig in rigs}
@@ -176,7 +153,7 @@ def _copy(stage: bpy.types.Scene, rig: bpy.types.Object, shown: _Shown, wanted: 
     copy = bpy.data.objects.new(rig.name, data)
     stage.collection.objects.link(copy)
     data.pose_position = "POSE"
-    hips, root, line, in_place = _root_motion(rig, shown, wanted, told)
+    hips, root, line, in_place = root_motion(rig, shown, wanted, told)
     kept = _kept(rig, wanted, root)
     poses = {name: shown.poses[:, number] for number, name in enumerate(shown.bones) if name in kept}
     if in_place is not None:
@@ -196,54 +173,6 @@ def _kept(rig: bpy.types.Object, wanted: Wanted, root: str | None) -> set[str]:
         return every
     named = root or next((b.name for b in rig.data.bones if b.parent is None and b.name.lower() == ROOT_BONE), None)
     return deform | ({named} if named else set())
-
-
-def _root_motion(rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: list[str]):
-    """Hips, root bone (None: it has none), the root's way (F, 4, 4) and what brings everything back to where it began
-    (F, 4, 4); both None where they are not asked for."""
-    if wanted.root == "KEEP":
-        return None, None, None, None
-    from ...beyond_mocap.motion.path.root_path import ground_path
-
-    table = bone_maps.kept(rig) or bone_maps.suggest(rig)
-    at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}
-    world = shown.lies[:, None] @ shown.poses[:, list(at.values())]
-    legs = world[:, :, :3, 3]
-    across = legs[:, 0] - legs[:, 1]
-    facing = np.unwrap(np.arctan2(-across[:, 0], across[:, 1]))
-    units = units_per_metre(bpy.context.scene)
-    place, yaw = ground_path(legs.mean(axis=1)[:, :2] / units, facing, frames_per_second(bpy.context.scene) if
-                             wanted.rate is None else wanted.rate,
-                             "straight" if wanted.root == "STRAIGHT" else "smooth")
-    way = np.tile(np.eye(4), (len(yaw), 1, 1))
-    way[:, :3, :3] = quaternion.to_matrix(quaternion.about_up(yaw))
-    way[:, :2, 3] = place * units
-    inward = np.linalg.inv(shown.lies)
-    own = table.get("root")
-    if wanted.root == "IN_PLACE":
-        return table["hips"], own, None, inward @ way[:1] @ np.linalg.inv(way) @ shown.lies
-    if own is not None:
-        rest = np.array(rig.data.bones[own].matrix_local)
-        upright = _standing(rig, table)
-        return table["hips"], own, inward @ way @ upright @ rest, None
-    told.append(f"{rig.name} has no root bone: one named {ROOT_BONE!r} was added to the copy in the file")
-    return table["hips"], None, inward @ way @ _standing(rig, table), None
-
-
-def _standing(rig: bpy.types.Object, table: dict[str, str]) -> np.ndarray:
-    """The armature's space at rest -> standing over the origin, facing +X (4, 4): what the root's way is a way of."""
-    heads = {part: np.array(rig.data.bones[table[part]].head_local) for part in bone_maps.LEGS}
-    lie = np.array(rig.matrix_world.to_3x3())
-    hips = 0.5 * (heads["left upper_leg"] + heads["right upper_leg"])
-    up = nearest_axis(hips - 0.5 * (heads["left foot"] + heads["right foot"]))
-    across = heads["left upper_leg"] - heads["right upper_leg"]
-    left = nearest_axis(across - (across @ up) * up)
-    size = np.cbrt(abs(np.linalg.det(lie)))
-    turn = np.stack([np.cross(left, up), left, up]) * size
-    out = np.eye(4)
-    out[:3, :3] = turn
-    out[:3, 3] = -turn @ (hips - (hips @ up) * up)
-    return out
 
 
 def _plain(stage, copy, rig, kept: set[str], hips: str | None, told: list[str]) -> dict[str, str | None]:
@@ -404,8 +333,7 @@ def _save(stage, copies, wanted: Wanted) -> None:
 
 
 def with_ending(path: Path, ending: str) -> Path:
-    """A path with this ending: in place of another form's, else behind what stands there ("walk.v2" keeps its
-    ".v2")."""
+    """A path with this ending: in place of another form's, else added ("walk.v2" keeps its ".v2")."""
     if path.suffix.lower() in {ending, *SUFFIXES.values()}:
         return path.with_suffix(ending)
     return path.with_name(path.name + ending)
@@ -425,7 +353,6 @@ def saved(out: Path, write_to) -> None:
 
 def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
     from ...beyond_mocap.files.bvh import bvh
-    from .source import evaluated
 
     frames = np.arange(stage.frame_end + 1)
     for copy in copies:
@@ -435,21 +362,19 @@ def _write_bvh(stage: bpy.types.Scene, copies, path: Path) -> None:
 
 def _fbx(path: str, engine: str, selected: bool) -> None:
     forward, up = _FBX_AXES[engine]
-    bpy.ops.export_scene.fbx(
-        filepath=path, check_existing=False, use_selection=selected, object_types={"ARMATURE", "MESH", "EMPTY"},
-        axis_forward=forward, axis_up=up, apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY"
-        else "FBX_SCALE_NONE",
-        add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True, bake_anim_use_nla_strips=False,
-        bake_anim_use_all_actions=False, bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0,
-    )
+    bpy.ops.export_scene.fbx(filepath=path, check_existing=False, use_selection=selected,
+                             object_types={"ARMATURE", "MESH", "EMPTY"}, axis_forward=forward, axis_up=up,
+                             apply_scale_options="FBX_SCALE_UNITS" if engine == "UNITY" else "FBX_SCALE_NONE",
+                             add_leaf_bones=False, bake_anim=True, bake_anim_use_all_bones=True,
+                             bake_anim_use_nla_strips=False, bake_anim_use_all_actions=False,
+                             bake_anim_force_startend_keying=True, bake_anim_simplify_factor=0.0)
 
 
 def _glb(path: str, _engine: str, selected: bool) -> None:
-    bpy.ops.export_scene.gltf(
-        filepath=path, check_existing=False, export_format="GLB", use_selection=selected, use_active_scene=True,
-        export_yup=True, export_animations=True, export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
-        export_force_sampling=True, export_optimize_animation_size=False,
-    )
+    bpy.ops.export_scene.gltf(filepath=path, check_existing=False, export_format="GLB", use_selection=selected,
+                              use_active_scene=True, export_yup=True, export_animations=True,
+                              export_animation_mode="ACTIVE_ACTIONS", export_frame_range=True,
+                              export_force_sampling=True, export_optimize_animation_size=False)
 
 
 def _usd(path: str, engine: str, selected: bool) -> None:

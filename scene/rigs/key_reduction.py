@@ -13,10 +13,10 @@ import bpy
 import numpy as np
 
 from ...beyond_mocap.base.errors import InputError
-from ...beyond_mocap.base.vectors import unit_vectors
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
-from . import bake_record
+from ..path_editing.rig_look import channel_of, turns
+from . import rig_bake
 from .driven import Driven
 
 BEZIER, ALIGNED = 2, "ALIGNED"
@@ -53,12 +53,12 @@ def reduce(
         if np.abs(np.linalg.norm(reach(found) - places, axis=-1)).max(initial=0.0) <= tolerance:
             break
         share *= _TIGHTER
-    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), bake_record.is_as_baked(rig)
+    before, as_baked = sum(len(curve.keyframe_points) for curve in curves.values()), rig_bake.is_as_baked(rig)
     for path, values in dense.items():
         for index in range(values.shape[1]):
             _rekey(curves[path, index], frames, values[:, index], kept[path])
     if as_baked:
-        bake_record.note(rig)
+        rig_bake.note_keys(rig)
     return before, sum(len(curve.keyframe_points) for curve in curves.values())
 
 
@@ -119,18 +119,7 @@ def _metric(rig: bpy.types.Object, path: str):
     if not _is_turn(path):
         return lambda a, b: np.linalg.norm(a - b, axis=1)
     mode = rig.path_resolve(path.rpartition(".")[0]).rotation_mode
-    return lambda a, b: _angle(as_turns(a, mode), as_turns(b, mode))
-
-
-def as_turns(values: np.ndarray, mode: str) -> np.ndarray:
-    """Rotations (F, 4) that channel values mean in a rotation mode."""
-    if mode == "QUATERNION":
-        return quaternion.normalized(values)
-    if mode == "AXIS_ANGLE":
-        axis = unit_vectors(values[:, 1:])
-        return quaternion.about_axis(axis, values[:, 0])
-    order = mode[::-1]  # see `action`: Blender names the axes in the order in which they are applied
-    return quaternion.from_euler(values[:, ["XYZ".index(letter) for letter in order]], order)
+    return lambda a, b: _angle(turns(mode, a), turns(mode, b))
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -145,15 +134,14 @@ def _extremities(driven: Driven, dense: dict[str, np.ndarray]):
     count = len(next(iter(dense.values())))
 
     def reach(changed: dict[str, np.ndarray]) -> np.ndarray:
-        turns, locations = {}, {}
+        turned, locations = {}, {}
         for name in controls.bones:
             path = f'pose.bones["{bpy.utils.escape_identifier(name)}"]'
             mode = rig.pose.bones[name].rotation_mode
-            kind = {"QUATERNION": "quaternion", "AXIS_ANGLE": "axis_angle"}.get(mode, "euler")
-            values = changed.get(f"{path}.rotation_{kind}", dense.get(f"{path}.rotation_{kind}"))
-            turns[name] = quaternion.identity(count) if values is None else as_turns(values, mode)
+            values = changed.get(f"{path}.{channel_of(mode)}", dense.get(f"{path}.{channel_of(mode)}"))
+            turned[name] = quaternion.identity(count) if values is None else turns(mode, values)
             locations[name] = changed.get(f"{path}.location", dense.get(f"{path}.location"))
-        return controls.forward(turns, locations)[:, ends] * driven.placement.scale
+        return controls.forward(turned, locations)[:, ends] * driven.placement.scale
 
     return reach
 

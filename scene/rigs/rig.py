@@ -30,36 +30,23 @@ IK = (
     ("MUTE", "Switch Off", "Constraints that hold driven bones are switched off by a key (influence 0)"),
     ("BAKE", "Bake Targets", "IK targets and poles follow hands, feet, knees and elbows; constraints stay as they are"),
 )
-FORMATS = (
-    ("FBX", "FBX", "Autodesk FBX (.fbx)"),
-    ("GLB", "glTF", "glTF binary (.glb), always Y up"),
-    ("USD", "USD", "Universal Scene Description (.usdc)"),
-    ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"),
-)
-ENGINES = (
-    ("BLENDER", "Blender", "Axes as Blender's exporters have them: Y up, -Z forward"),
-    ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
-    ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
-    ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"),
-)
-WHO = (
-    ("ACTIVE", "Active", "The active player's rig, else body; without players the active armature"),
-    ("SELECTED", "Selected", "All selected armatures"),
-    ("PLAYERS", "All Players", "The rig, else the body, of every ticked player"),
-)
+FORMATS = (("FBX", "FBX", "Autodesk FBX (.fbx)"), ("GLB", "glTF", "glTF binary (.glb), always Y up"),
+           ("USD", "USD", "Universal Scene Description (.usdc)"),
+           ("BVH", "BVH", "Biovision hierarchy (.bvh): the skeleton alone, centimetres, Y up"))
+ENGINES = (("BLENDER", "Blender", "Axes as Blender's exporters have them: Y up, -Z forward"),
+           ("UNREAL", "Unreal", "For Unreal Engine: FBX in centimetres, X forward, Z up"),
+           ("UNITY", "Unity", "For Unity: FBX with its scale as units, Y up, -Z forward"),
+           ("GODOT", "Godot", "For Godot: Y up, -Z forward, in USD too"))
+WHO = (("ACTIVE", "Active", "The active player's rig, else body; without players the active armature"),
+       ("SELECTED", "Selected", "All selected armatures"),
+       ("PLAYERS", "All Players", "The rig, else the body, of every ticked player"))
 
 
 class BeyondMocapRigBone(bpy.types.PropertyGroup):
     """A line of the bone map; its name is the part of the body."""
 
-    bone: StringProperty(
-        name="Bone", description="The bone, or control, that moves this part; empty where there is none"
-    )
-
-
-def is_armature(_settings, candidate: bpy.types.Object) -> bool:
-    """Whether an object may be picked as a rig."""
-    return candidate.type == "ARMATURE"
+    bone: StringProperty(name="Bone",
+                         description="The bone, or control, that moves this part; empty where there is none")
 
 
 def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
@@ -105,12 +92,10 @@ def _chosen(settings, _context) -> None:
 class BeyondMocapRig(bpy.types.PropertyGroup):
     """Rig, map, baking, export."""
 
-    source: PointerProperty(
-        name="Source", type=bpy.types.Object, poll=is_armature,
-        description="The armature whose motion is baked; empty takes the active player's body",
-    )
+    source: PointerProperty(name="Source", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
+                            description="The armature whose motion is baked; empty takes the active player's body")
     target: PointerProperty(
-        name="Rig", type=bpy.types.Object, poll=is_armature, update=_chosen,
+        name="Rig", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE", update=_chosen,
         description="The rig that the motion is baked to: Rigify, Mixamo, Unreal, MetaHuman or any humanoid",
     )
     bones: CollectionProperty(type=BeyondMocapRigBone, description="Which bone of the rig is which part of the body")
@@ -119,25 +104,19 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     root: EnumProperty(name="Root Motion", items=ROOTS, default="KEEP", description="What the root bone carries")
     steps: EnumProperty(name="Steps", items=STEPS, default="AUTO", description="What legs of another length do")
     ik: EnumProperty(name="IK", items=IK, default="MUTE", description="What becomes of inverse kinematics on the rig")
-    plants: BoolProperty(
-        name="Plant Feet", default=True, description="Hold standing feet on the ground with the rig's own legs"
-    )
+    plants: BoolProperty(name="Plant Feet", default=True,
+                         description="Hold standing feet on the ground with the rig's own legs")
     reduces: BoolProperty(name="Fewer Keys", default=False, description="Leave out keys that the curves do not need")
-    tolerance: FloatProperty(
-        name="Off by", default=0.002, min=0.0001, max=0.1, precision=4, unit="LENGTH", subtype="DISTANCE",
-        description="Distance that hands, feet and head may be off after keys are left out",
-    )
-    turn_tolerance: FloatProperty(
-        name="Turned by", default=0.00872665, min=0.0001, max=0.5, subtype="ANGLE",
-        description="Angle that a bone may be off after keys are left out",
-    )
+    tolerance: FloatProperty(name="Off by", default=0.002, min=0.0001, max=0.1, precision=4, unit="LENGTH",
+                             subtype="DISTANCE",
+                             description="Distance that hands, feet and head may be off after keys are left out")
+    turn_tolerance: FloatProperty(name="Turned by", default=0.00872665, min=0.0001, max=0.5, subtype="ANGLE",
+                                  description="Angle that a bone may be off after keys are left out")
     format: EnumProperty(name="Format", items=FORMATS, default="FBX", description="File format to export")
     engine: EnumProperty(name="For", items=ENGINES, default="BLENDER", description="Whose axes and units")
     who: EnumProperty(name="Who", items=WHO, default="ACTIVE", description="What is exported")
-    own_rate: BoolProperty(
-        name="Own Rate", default=False, description="At the rate that was synthesized instead of the scene's"
-    )
-    deform_only: BoolProperty(
-        name="Deform Bones Only", default=True, description="Leave controls and helper bones out of the file"
-    )
+    own_rate: BoolProperty(name="Own Rate", default=False,
+                           description="At the rate that was synthesized instead of the scene's")
+    deform_only: BoolProperty(name="Deform Bones Only", default=True,
+                              description="Leave controls and helper bones out of the file")
     meshes: BoolProperty(name="Meshes", default=True, description="Export the meshes that the armature moves, too")

@@ -1,7 +1,8 @@
-"""A motion onto somebody's own rig: retargeted, feet planted on its legs, and laid down on its controls as one action.
+"""A motion onto the user's own rig: retargeted, feet planted on its legs, and laid down on its controls as one action.
 
 The rig's driven bones become a skeleton of the core (`rigs.driven`); the core carries the motion over (`retarget`) and
-plants the feet (`foot_plant`, both in `rigs.fit`); `rigs.controls` turns the pose that comes out into channels.
+plants the feet (`foot_plant`, both in `rigs.fit`); `rigs.controls` turns the pose that comes out into channels. The
+baked action remembers how the rig was before, and with which keys it was baked.
 """
 
 from __future__ import annotations
@@ -12,15 +13,19 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ...beyond_mocap.base.digest import hex_digest
+from ...beyond_mocap.base.errors import InputError
 from ..core import channels
 from ..path_editing import riders
-from .bake_record import BEFORE, MARK, keep_own, note, remembered
 from .bone_curves import bone_curves, setting_curves, wanted
+from .control_study import CHANNELS
 from .driven import Driven
-from .fit import BakeOptions, Fit, Slide
-from .source import Source
+from .fit import BakeOptions, Fit, Slide, Source
 
 _OFF = 1e-3  # metres that are told
+MARK = "beyond_mocap_rig"
+BEFORE = "beyond_mocap_before"
+KEYS = "beyond_mocap_keys"  # digest of the keys that were baked: with others somebody has worked on them
 
 
 @dataclass
@@ -66,11 +71,11 @@ def lay(one: Fitted) -> Baked:
     """Let the rig play what was worked out for it, as a new action."""
     rig, driven = one.driven.rig, one.driven
     left = riders.leave(rig)
-    before, kept = remembered(rig, driven), keep_own(rig)
+    before, kept = record_before(rig, driven), keep_edited_bake(rig)
     channels.discard(rig, MARK)
     made = channels.animate(rig, f"{one.name} on {rig.name}", one.frames, one.curves)
     made[MARK], made[BEFORE] = True, json.dumps(before)
-    note(rig)
+    note_keys(rig)
     for switch in driven.controls.switches:
         rig.pose.bones[switch.bone][switch.name] = switch.value
     told = [*left, *one.told, *kept, *_off(driven, one.frames, one.heads, driven.scene)]
@@ -112,3 +117,75 @@ def _off(driven: Driven, frames: np.ndarray, heads: np.ndarray, scene: bpy.types
     if worst > _OFF:
         return [f"the rig itself holds {where} up to {1000 * worst:.0f} mm from where it should be (constraints?)"]
     return []
+
+
+def record_before(rig: bpy.types.Object, driven: Driven) -> dict:
+    """How the rig was before, for `remove_bake`; what an earlier bake remembered where it is still on."""
+    playing, slot = channels.playing(rig)
+    if playing is not None and playing.get(MARK) and BEFORE in playing:
+        return json.loads(playing[BEFORE])
+    bones = rig.pose.bones
+    return {
+        "action": playing.name if playing else "", "slot": slot.identifier if slot else "",
+        "bones": {name: {c: list(getattr(bones[name], c)) for c in CHANNELS} for name in driven.controls.bones},
+        "switches": [[s.bone, s.name, s.before] for s in driven.controls.switches],
+        "constraints": [[o.bone, o.constraint, bones[o.bone].constraints[o.constraint].influence]
+                        for o in driven.overrides],
+    }
+
+
+def note_keys(rig: bpy.types.Object) -> None:
+    """Remember the keys of the action that the rig plays as those that were baked."""
+    channels.playing(rig)[0][KEYS] = _digest(rig)
+
+
+def is_as_baked(rig: bpy.types.Object) -> bool:
+    """Whether nobody has changed the keys of the baked action that the rig plays."""
+    return channels.playing(rig)[0].get(KEYS) == _digest(rig)
+
+
+def _digest(rig: bpy.types.Object) -> str:
+    parts: list = []
+    for place, curve in sorted(channels.curves(*channels.playing(rig)).items()):
+        points = np.empty(2 * len(curve.keyframe_points), np.float32)
+        curve.keyframe_points.foreach_get("co", points)
+        parts += [repr(place), points]
+    return hex_digest(*parts, digits=64)
+
+
+def keep_edited_bake(rig: bpy.types.Object) -> list[str]:
+    """A baked action on which somebody has worked is the user's own from now on; a line about it."""
+    playing, _ = channels.playing(rig)
+    if playing is None or not playing.get(MARK) or is_as_baked(rig):
+        return []
+    for name in (MARK, BEFORE, KEYS):
+        if name in playing:
+            del playing[name]
+    return [f"keys of the bake before were changed by hand: it is kept as the action {playing.name}"]
+
+
+def remove_bake(rig: bpy.types.Object) -> None:
+    """Take a baked action off a rig and out of the file; the rig is as before. InputError where it plays none."""
+    playing, _ = channels.playing(rig) if rig is not None else (None, None)
+    if playing is None or not playing.get(MARK):
+        raise InputError(f"rig {rig.name if rig else ''}", "it plays no action that was baked here", "a baked rig",
+                         "Bake to Rig first")
+    channels.check_free(rig)
+    before = json.loads(playing.get(BEFORE, "{}"))
+    rig.animation_data.action = None
+    if playing.users - playing.use_fake_user == 0:
+        bpy.data.actions.remove(playing)
+    for name, values in before.get("bones", {}).items():
+        for channel, value in values.items():
+            if name in rig.pose.bones:
+                setattr(rig.pose.bones[name], channel, value)
+    for bone, name, value in before.get("switches", []):
+        if bone in rig.pose.bones:
+            rig.pose.bones[bone][name] = value
+    for bone, name, value in before.get("constraints", []):
+        if bone in rig.pose.bones and name in rig.pose.bones[bone].constraints:
+            rig.pose.bones[bone].constraints[name].influence = value
+    found = bpy.data.actions.get(before.get("action", ""))
+    if found is not None:
+        slot = next((slot for slot in found.slots if slot.identifier == before.get("slot")), None)
+        channels.assign(rig, found, slot)

@@ -1,7 +1,8 @@
-"""Keeps the streamed body, the figures and what is made of hits up to date: from a timer where there is a window, from
-scripts by calling `look`.
+"""The stream that is listened to, and the armature that does what the user does: kept up to date, with the figures and
+what is made of hits, from a timer where there is a window, from scripts by calling `look`.
 
-What arrives never changes anything but the streamed body's pose. It is made when its first frame is here.
+What arrives never changes anything but the streamed body's pose. It is made when its first frame is here. The user
+begins and ends the one listener of the session; it ends too when a file is loaded or the add-on goes.
 """
 
 from __future__ import annotations
@@ -11,42 +12,52 @@ import time
 from collections import deque
 
 import bpy
+import numpy as np
 
-from ...beyond_mocap.base.errors import BeyondMocapError
+from ...beyond_mocap.base.errors import BeyondMocapError, InputError
+from ...beyond_mocap.motion import quaternion
 from ...beyond_mocap.motion.motion import Motion
+from ...beyond_mocap.motion.skeleton import Skeleton
 from ...beyond_mocap.passes.hits import HitMotion
+from ...beyond_mocap.passes.stream.bvh_stream import hierarchy_of
 from ...beyond_mocap.passes.stream.listener import Listener, poses
-from ..core import window
+from ...beyond_mocap.passes.stream.live_hits import LiveHits
+from ..core import action, window
 from ..core.live import Watcher, attempt
-from . import receiver, streamed
+from ..core.measure import frames_per_second
+from ..result import bake
+from ..rigs import armature
+from ..stage import body
 
 TICK, IDLE = 1.0 / 60.0, 0.25
-TOLD_EVERY = 0.25
-LOOKED_EVERY = 0.1
-MOST_BODIES = 20
-"""Streamed bodies that a session makes: a sender that changes its skeleton again and again is stopped."""
+TOLD_EVERY, LOOKED_EVERY = 0.25, 0.1
+MOST_BODIES = 20  # streamed bodies that a session makes: a sender that changes its skeleton again and again is stopped
 
-_state = {"seen": 0, "told": 0.0, "looked": 0.0, "bodies": 0, "windowed": False}
+MARK = "beyond_mocap_stream"
+SHIRT = (0.55, 0.55, 0.58)
+
+_held: dict[str, object] = {}
+_state = {"seen": 0, "told": 0.0, "looked": 0.0, "bodies": 0}
 _shown: deque[float] = deque(maxlen=60)
 _on_hit: list = []
 _on_look: list = []
 
 
-def on_hit(action) -> None:
-    """`action(scene, hit, seconds)` is called for every strike that is recognised, until `forget`."""
-    _on_hit.append(action)
+def on_hit(call) -> None:
+    """`call(scene, hit, seconds)` is called for every strike that is recognised, until `forget`."""
+    _on_hit.append(call)
 
 
-def on_look(action) -> None:
-    """`action(scene)` is called at every look, until `forget`."""
-    _on_look.append(action)
+def on_look(call) -> None:
+    """`call(scene)` is called at every look, until `forget`."""
+    _on_look.append(call)
 
 
-def forget(action) -> None:
+def forget(call) -> None:
     """Call it no more."""
-    for actions in (_on_hit, _on_look):
-        if action in actions:
-            actions.remove(action)
+    for calls in (_on_hit, _on_look):
+        if call in calls:
+            calls.remove(call)
 
 
 def began() -> None:
@@ -58,11 +69,10 @@ def began() -> None:
 
 def look(scene: bpy.types.Scene) -> HitMotion | None:
     """Show what has arrived in a scene, tell how it does, and say which strike has just been recognised, if any."""
-    listener, found = receiver.listener(), None
-    if listener is not None:
-        found = _receive(scene, listener)
-    for action in list(_on_look):
-        action(scene)
+    listener = current_listener()
+    found = _receive(scene, listener) if listener is not None else None
+    for call in list(_on_look):
+        call(scene)
     return found
 
 
@@ -73,7 +83,7 @@ def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
         _state["seen"] = latest.number
         if _show(scene, listener, latest) == "posed":
             _shown.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
-        if receiver.listener() is None:  # given up
+        if current_listener() is None:  # given up
             return None
     found = None
     if now - _state["looked"] >= LOOKED_EVERY:
@@ -89,23 +99,22 @@ def _show(scene, listener: Listener, latest) -> str:
     """Pose the streamed body: "posed", "made" where it had to be made first, "" where it could not be."""
     settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, poses([latest])
     made = "posed"
-    if not streamed.fits(settings.body, scene, skeleton):
+    if not can_show(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
             _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is left: look at the sender")
             return ""
         _state["bodies"] += 1
-        settings.body = streamed.create(bpy.context, Motion(skeleton, root, rotations, 60.0))
+        settings.body = create_body(bpy.context, Motion(skeleton, root, rotations, 60.0))
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Body")
         made = "made"
-    streamed.pose(settings.body, scene, skeleton, root[0], rotations[0])
+    pose_body(settings.body, scene, skeleton, root[0], rotations[0])
     return made
 
 
 def _hit(scene) -> HitMotion | None:
-    watch = receiver.hits()
     try:
-        found = watch.look()
+        found = _held["hits"].look()
     except BeyondMocapError as error:
         bpy.context.window_manager.beyond_mocap_streaming.hit = str(error)
         return None
@@ -114,14 +123,14 @@ def _hit(scene) -> HitMotion | None:
     hit, seconds = found
     side = f"{hit.side} " if hit.side else ""
     bpy.context.window_manager.beyond_mocap_streaming.hit = f"{side}{hit.part}, {hit.max_speed:.1f} m/s"
-    for action in list(_on_hit):
-        action(scene, hit, seconds)
+    for call in list(_on_hit):
+        call(scene, hit, seconds)
     return hit
 
 
 def tell() -> None:
     """Write down for the panel how the stream does."""
-    told, listener = bpy.context.window_manager.beyond_mocap_streaming, receiver.listener()
+    told, listener = bpy.context.window_manager.beyond_mocap_streaming, current_listener()
     if listener is None:
         told.on, told.state, told.line, told.figures = False, "stopped", "", ""
         return
@@ -137,14 +146,14 @@ def tell() -> None:
 
 def _give_up(why: str) -> None:
     """The stream ends by itself; what is told stays."""
-    receiver.stop()
+    stop_listening()
     tell()
     told = bpy.context.window_manager.beyond_mocap_streaming
     told.state, told.line = "failed", why
 
 
 def _tick() -> float:
-    if receiver.listener() is None and not _on_look:
+    if current_listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             tell()
             window.redraw()
@@ -162,8 +171,82 @@ def _tick() -> float:
 
 
 def _end() -> None:
+    stop_listening()
     _on_hit.clear()
     _on_look.clear()
 
 
-WATCHER = Watcher(name="Stream", look=_tick, ends=_end)
+def start_listening(settings) -> Listener:
+    """Listen as the settings say. InputError, and nothing changed, if the port is taken or the suit's file is none."""
+    clip = bpy.path.abspath(settings.clip) if settings.clip else ""
+    hierarchy = hierarchy_of(clip) if clip else None
+    before = current_listener()
+    if before is not None:
+        raise InputError(f"port {before.port}", "a stream is listened to already", "one at a time", "press Stop Stream")
+    one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
+    _held["listener"] = one
+    _held["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
+                             settings.threshold or None)
+    return one
+
+
+def stop_listening() -> None:
+    """Listen no more."""
+    one = _held.pop("listener", None)
+    _held.clear()
+    if one is not None:
+        one.stop()
+
+
+def current_listener() -> Listener | None:
+    """The listener, where there is one."""
+    return _held.get("listener")
+
+
+WATCHER = Watcher(name="Stream", look=_tick, closing=stop_listening, ends=_end)
+
+
+def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: Skeleton) -> bool:
+    """Whether an object can show this skeleton: an armature of the scene, of this file, with a bone for every joint."""
+    return (
+        thing is not None and thing.type == "ARMATURE" and thing.library is None and thing.name in scene.objects
+        and all(name in thing.data.bones for name in skeleton.names)
+    )
+
+
+def create_body(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> bpy.types.Object:
+    """A dressed armature for the body that `motion` shows."""
+    where = bake.collection(context.scene)
+    thing = armature.create(context, motion.skeleton, name, where)
+    body.create(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
+    thing[MARK] = True
+    return thing
+
+
+def pose_body(
+    thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray
+) -> None:
+    """Put an armature into a pose: root (3,) m and local rotations (J, 4). Where the object lies and which way it is
+    turned about the vertical is left to the user, so that the streamed body can stand beside others."""
+    lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
+    turn = quaternion.about_up(quaternion.yaw(lie.rotation))
+    root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)
+    local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), quaternion.multiply(turn, local[0]))
+    turned = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
+    bones = thing.pose.bones
+    every = np.empty((len(bones), 4), np.float32)
+    bones.foreach_get("rotation_quaternion", every.ravel())
+    every[[bones.find(name) for name in skeleton.names]] = turned
+    bones.foreach_set("rotation_quaternion", every.ravel())
+    top = bones[skeleton.names[0]]
+    shift = lie.to_armature(root) - np.array(top.bone.head_local)
+    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # also tells Blender that the pose is another
+
+
+def keep_recording(context: bpy.types.Context, motion: Motion, name: str = "Recorded") -> bpy.types.Object:
+    """A body of its own that plays `motion` from the present frame on."""
+    if motion.duration * frames_per_second(context.scene) < 1.0:
+        raise InputError("stream", "less than a frame", "a second or more of it", "let the stream run for a while")
+    thing = create_body(context, motion, name)
+    action.write(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
+    return thing

@@ -107,9 +107,8 @@ def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
     hits = [hit for side in sides for hit in analyse(motion, settings.part, side, settings.threshold or None).motions]
     if not hits:
-        raise InputError(
-            f"armature {body.name}", f"no strike of the {settings.part}", "one", "choose the part under Live Stream"
-        )
+        raise InputError(f"armature {body.name}", f"no strike of the {settings.part}", "one",
+                         "choose the part under Live Stream")
     now = scene.frame_current - (action.first_frame(body) or 0)
     return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 

@@ -14,19 +14,15 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
 
     attached_to = ("Scene.beyond_mocap_stream",)
 
-    clip: StringProperty(
-        name="Suit's BVH", subtype="FILE_PATH",
-        description="A BVH file of the same suit, for streams that send numbers only; else empty",
-    )
+    clip: StringProperty(name="Suit's BVH", subtype="FILE_PATH",
+                         description="A BVH file of the same suit, for streams that send numbers only; else empty")
     target: StringProperty(
         name="Target",
         description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a "
         "player",
     )
-    body: PointerProperty(
-        name="Streamed Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
-        description="The armature that does what the user does; made where it is missing",
-    )
+    body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
+                          description="The armature that does what the user does; made where it is missing")
 
 
 class BeyondMocapStreaming(bpy.types.PropertyGroup):

@@ -1,8 +1,7 @@
 """The ball of a throw or kick: in the hand or lying, then its flight; and its trajectory as a curve.
 
 Up to the last frame before the release a thrown ball is carried by the hand's bone (`passes.possession`), so that it
-stays in the hand when somebody works on the pose. What it did before goes on until then (`earlier`), and comes back
-with `give_back`.
+stays in the hand when the pose is worked on. What it did before goes on until then, and comes back with `give_back`.
 """
 
 from __future__ import annotations
@@ -20,16 +19,16 @@ from ..core.set_aside import bring_back, drop, put_aside
 from ..passes import possession
 from ..passes.settings import KEPT
 from ..passes.shown import remove
+from ..path_editing.curve import remove_curve
 from ..result import bake
 from ..stage import ball as balls
-from . import earlier
+from .order import first_motion, flies_for, taken_from, way_before
 from .settings import MARK, BeyondMocapThrow
 
 if TYPE_CHECKING:
     from .made import Result
 
-FAR = 0.3
-"""Metres from which on it is told that a ball jumps to the hand."""
+FAR = 0.3  # metres from which on it is told that a ball jumps to the hand
 NAMES = {"throw": "Thrown Ball", "kick": "Kicked Ball"}
 
 
@@ -38,7 +37,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> li
     it, or the foot meets it. Returns lines about it."""
     wish = body.beyond_mocap_throw
     if wish.flown is not None and (
-        earlier.flies_for(wish.flown, body)
+        flies_for(wish.flown, body)
         or wish.flown != wish.ball
         and not (wish.ball is None and _is_made(wish) and wish.flown.name in scene.objects)
     ):
@@ -79,7 +78,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> li
 def check(wish: BeyondMocapThrow, result: "Result") -> None:
     """InputError where others carry the ball when a hand is to have it."""
     if wish.ball is not None and result.order.act == "throw":
-        earlier.taken_from(wish.ball, wish, *_spans(result))
+        taken_from(wish.ball, wish, *_spans(result))
 
 
 def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
@@ -87,12 +86,9 @@ def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
     with the one that it was duplicated from stays with that one."""
     wish = body.beyond_mocap_throw
     ball, path = wish.flown, wish.curve
-    if ball is None or not earlier.flies_for(ball, body):
+    if ball is None or not flies_for(ball, body):
         if path is not None:
-            data = path.data
-            bpy.data.objects.remove(path)
-            if not data.users:
-                bpy.data.curves.remove(data)
+            remove_curve(path)
         if ball is not None:
             _brought_back(scene, ball, wish)
     drop(wish.ball_before, MARK)
@@ -105,7 +101,7 @@ def keep(body: bpy.types.Object) -> None:
     """The ball is the user's from now on, with the way that it goes."""
     wish = body.beyond_mocap_throw
     ball = wish.flown
-    if ball is not None and not earlier.flies_for(ball, body):
+    if ball is not None and not flies_for(ball, body):
         for action in (channels.playing(ball)[0], ball.beyond_mocap_ball.before.action):
             if action is not None:
                 action.pop(MARK, None)
@@ -168,7 +164,7 @@ def keys(
     flies = frames, flight.at(seconds), flight.rotations(seconds)
     begins, last = _spans(result)
     first = int(round(joined.start * fps))
-    does = earlier.moves(ball, wish) if ball is not None else None
+    does = first_motion(ball, wish) if ball is not None else None
     if result.order.act == "kick":
         before = np.array([min(first, last - 1) if does is None else last, last], float)
         lies = before[-2 if does is None else -1 :]
@@ -179,7 +175,7 @@ def keys(
         return *_flying(still, flies), None, []
     taken = first if does is None else max(first, begins)
     if ball is not None:
-        taken = earlier.taken_from(ball, wish, taken, last)
+        taken = taken_from(ball, wish, taken, last)
     rows = np.arange(taken, last + 1)
     held = rows.astype(float), *in_hand(result, rows - first)
     told = []
@@ -212,7 +208,7 @@ def _hand(result: "Result") -> int:
 def _earlier(scene, ball, wish, first: int, last: int):
     """Frames (F,), places (F, 3) m and rotations (F, 4) of what a ball does without this throw."""
     frames = np.arange(first, last + 1)
-    way = earlier.way(ball, wish, frames)
+    way = way_before(ball, wish, frames)
     places = np.array([place.to_translation() for place in way]) / units_per_metre(scene)
     return frames.astype(float), places, np.array([tuple(place.to_quaternion()) for place in way])
 

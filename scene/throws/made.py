@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -36,7 +37,6 @@ class Result:
     usual_jerk: float
 
 
-
 def work(order: Order, progress, cancelled, _hurry) -> Result:
     """The throw, and the motion it is part of. Never touches bpy."""
     from ...beyond_mocap.ball.flight import fly
@@ -60,10 +60,8 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
     motion, release = _shown(order, thrown, library is not None)
     told: tuple = ()
     if library is not None:
-        way = leave_path(
-            library, own, start, motion, release, at=order.at, action=order.act, progress=_share(progress, 0.3, 1.0),
-            cancelled=cancelled,
-        )
+        way = leave_path(library, own, start, motion, release, at=order.at, action=order.act,
+                         progress=_share(progress, 0.3, 1.0), cancelled=cancelled)
         own, start, told = way.motion, way.start, way.warnings
     fade = FADE if library is not None else EASED[order.act]
     joined = join_throw(own, start, motion, release, at=order.at, goes_on=library is None, fade=fade)
@@ -120,45 +118,34 @@ def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", floa
 def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
     """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
     the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
-
     from ...beyond_mocap.throws.leave_path import is_in_reach, stopping_place
+    from ...beyond_mocap.throws.network_npz import read_model, shipped_model
 
     def spot(seconds: float) -> tuple[float, ...]:
         return tuple(own.root_positions[int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1)), :2])
 
-    model = _model(order)
+    model = read_model(order.model) if order.model else shipped_model(order.act)
+    throw = partial(_thrown_from, order, target, model, progress=progress, cancelled=cancelled)
     if order.ball_place is not None:
-        return _thrown_from(order, target, model, where={"ball_place": tuple(order.ball_place)}, progress=progress,
-                            cancelled=cancelled)
+        return throw(where={"ball_place": tuple(order.ball_place)})
     if order.own is None:
-        return _thrown_from(order, target, model, where={"start": tuple(order.place)}, progress=progress,
-                            cancelled=cancelled)
-    thrown = _thrown_from(order, target, model, where={"over": spot(order.at)}, progress=progress, cancelled=cancelled)
+        return throw(where={"start": tuple(order.place)})
+    thrown = throw(where={"over": spot(order.at)})
     motion, release = _shown(order, thrown, joined)
     begin = order.at - release
     if not joined:
-        return _thrown_from(order, target, model, where={"start": spot(begin)}, progress=progress, cancelled=cancelled)
+        return throw(where={"start": spot(begin)})
     if is_in_reach(own, start, motion, release, order.at):
         return thrown
-    return _thrown_from(order, target, model, where={"start": tuple(stopping_place(own, start, begin))},
-                        progress=progress, cancelled=cancelled)
-
-
-def _model(order: Order):
-    """The trained model that is asked for."""
-    from ...beyond_mocap.throws.network_npz import read_model, shipped_model
-
-    return read_model(order.model) if order.model else shipped_model(order.act)
+    return throw(where={"start": tuple(stopping_place(own, start, begin))})
 
 
 def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
     """The throw that begins, or is at its release, or finds the ball, `where`."""
     from ...beyond_mocap.throws import throw, throw_order
 
-    asked = throw_order.Order(
-        target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb, speed=order.speed or None, ball=order.kind,
-        fps=order.fps, seed=order.seed, **where,
-    )
+    asked = throw_order.Order(target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb,
+                              speed=order.speed or None, ball=order.kind, fps=order.fps, seed=order.seed, **where)
     return throw.throw_at(model, asked, order.skeleton, progress, cancelled)
 
 

@@ -11,10 +11,9 @@ from ...beyond_mocap.base.errors import InputError
 from ...beyond_mocap.motion import quaternion
 from ..core import channels
 from ..path_editing.rigs import carrier_of, is_plain
-from ..rigs import bake_record, bone_maps, rig_bake
+from ..rigs import bone_maps, rig_bake
 from ..rigs.driven import Driven, check
-from ..rigs.fit import BakeOptions
-from ..rigs.source import Source
+from ..rigs.fit import BakeOptions, Source
 from .settings import MARK
 
 if TYPE_CHECKING:
@@ -24,8 +23,7 @@ _own: dict[int, tuple["Motion | None", int]] = {}
 
 
 def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
-    """An armature whose bones do not simply play what they show, by its driven bones; None for plain ones. InputError
-    where it cannot be baked onto."""
+    """The driven bones of an armature that does not simply play its keys, else None. InputError if not bakeable."""
     wish = body.beyond_mocap_throw
     if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
         return None
@@ -34,8 +32,7 @@ def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
 
 
 def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
-    """What a rig shows without its throw, on a skeleton of its own, and the scene frame of its first pose; (None, first
-    frame) where it plays nothing."""
+    """What a rig shows without its throw, on its own skeleton, or None, and the scene frame of its first pose."""
     if body.beyond_mocap_throw.rigged:
         if body.session_uid not in _own:
             raise InputError(f"rig {body.name}", "it shows a throw of an earlier session", "its own motion",
@@ -68,13 +65,12 @@ def lift(rig: Driven) -> float:
 
 
 def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
-    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again.
-    Returns lines about it."""
+    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again. Returns lines about it."""
     source = Source(motion, start, name)
     fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]
     if played is not None and not played.get(MARK):
-        played.pop(bake_record.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
+        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
     baked = rig_bake.lay(fitted)
     baked.action[MARK] = True
     return baked.told
@@ -82,10 +78,10 @@ def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], m
 
 def take_away(body: bpy.types.Object) -> None:
     """Let a rig play what it did before its throw; a bake below it can be taken away as before."""
-    bake_record.remove(body)
+    rig_bake.remove_bake(body)
     played = channels.playing(body)[0]
-    if played is not None and bake_record.BEFORE in played:
-        played[bake_record.MARK] = True
+    if played is not None and rig_bake.BEFORE in played:
+        played[rig_bake.MARK] = True
 
 
 def _posed_otherwise(body: bpy.types.Object) -> bool:

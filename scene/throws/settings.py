@@ -1,5 +1,4 @@
-"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw. Saved with the file, known to
-undo."""
+"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw; saved with the file."""
 
 from __future__ import annotations
 
@@ -11,8 +10,7 @@ from ..result.result import BeyondMocapBefore
 
 USUAL = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}
-MARK = "beyond_mocap_thrown"
-"""Custom property of what a throw has made; no group has its name."""
+MARK = "beyond_mocap_thrown"  # custom property of what a throw has made; no group has its name
 
 
 @with_settings("throw", "throw.ball")
@@ -21,13 +19,10 @@ class BeyondMocapThrow(bpy.types.PropertyGroup):
 
     attached_to = ("Object.beyond_mocap_throw",)
 
-    target: PointerProperty(
-        name="Target", type=bpy.types.Object, description="What is to be hit: any object's origin; none: the 3D cursor"
-    )
-    ball: PointerProperty(
-        name="Ball", type=bpy.types.Object, poll=lambda _own, thing: thing.type in {"MESH", "EMPTY"},
-        description="The ball that flies; a kick strikes it where it lies. None: one is made",
-    )
+    target: PointerProperty(name="Target", type=bpy.types.Object,
+                            description="What is to be hit: any object's origin; none: the 3D cursor")
+    ball: PointerProperty(name="Ball", type=bpy.types.Object, poll=lambda _own, thing: thing.type in {"MESH", "EMPTY"},
+                          description="The ball that flies; a kick strikes it where it lies. None: one is made")
     throw_model: StringProperty(
         name="Throw Model", subtype="FILE_PATH",
         description="A trained model (.npz) of throws; empty: the one that comes with the extension",
@@ -57,6 +52,5 @@ def thrower(context: bpy.types.Context) -> bpy.types.Object | None:
     if chosen or active is None:
         return chosen[0] if chosen else None
     bodies = [thing for thing in context.scene.objects if thing.type == "ARMATURE" and thing.beyond_mocap_throw.made]
-    return next(
-        (body for body in bodies if active in (body.beyond_mocap_throw.flown, body.beyond_mocap_throw.target)), None
-    )
+    return next((body for body in bodies if active in (body.beyond_mocap_throw.flown, body.beyond_mocap_throw.target)),
+                None)

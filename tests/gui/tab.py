@@ -97,7 +97,7 @@ is."""
     busy += [name for name in live if room(name).WATCHER.dirty]
     busy += ["scene.result.freshness"] if settings().live and room("scene.result.freshness").LIVE.dirty else []
     thrown = any(one.type == "ARMATURE" and one.beyond_mocap_throw.made for one in window.window.scene.objects)
-    busy += ["scene.throws.live"] if thrown and room("scene.throws.live").WATCHER.dirty else []
+    busy += ["scene.throws.shown"] if thrown and room("scene.throws.shown").WATCHER.dirty else []
     waits = room("scene.timeline.strip_events")._later in room("scene.core.live")._timers
     return busy + ["scene.timeline.strip_events"] * waits
 

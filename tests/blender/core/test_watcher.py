@@ -240,7 +240,7 @@ def test_update_then_a_look_then_undo_is_one_step(room):
 
 def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatch):
     """Figures that a thread works out while undo comes between are those of another motion."""
-    riders, measure = room("scene.path_editing.riders"), room("scene.path_editing.measure")
+    riders, measure = room("scene.path_editing.riders"), room("scene.path_editing.live")
     body, go = rider(room), threading.Event()
     name = body.name
     body.beyond_mocap_ride.live = False
@@ -253,7 +253,7 @@ def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatc
     monkeypatch.setattr(measure, "REST", 0.0)
     monkeypatch.setattr(measure, "_figures", lambda *_: go.wait(10.0) and {"root_error_m": "of what was undone"})
     while not measure._running:
-        measure.WATCHER.tick()
+        measure.FIGURES.tick()
     job = measure._running[0][0]
     bpy.ops.ed.undo()
     body = bpy.data.objects[name]
@@ -261,7 +261,7 @@ def test_what_undo_has_taken_back_is_neither_measured_nor_drawn(room, monkeypatc
     while not job.poll():
         time.sleep(0.01)
     for _ in range(5):
-        measure.WATCHER.tick()
+        measure.FIGURES.tick()
     assert body.beyond_mocap_ride.figures == figures and riders.shown(body) is None
     bpy.ops.ed.redo()
     assert riders.shown(bpy.data.objects[name]) is not None
@@ -277,7 +277,7 @@ def left_over(room):
     window, live = room("scene.core.window"), room("scene.core.live")
     found += [*map(str, (*window._drawn, *window._clocks, *live._timers, *room("scene.result.queue").names()))]
     found += [job.kind for job in room("scene.core.background")._newest.values() if not job.stale]
-    found += ["stream"] if room("scene.stream.receiver").listener() is not None else []
+    found += ["stream"] if room("scene.stream.follow").current_listener() is not None else []
     found += ["rally"] if room("scene.stream.play").rally() is not None else []
     return found + ["queue"] * room("scene.result.queue").worked()
 
@@ -320,7 +320,7 @@ def a_match_child(room, _context):
 
 
 def a_stream(room, _context):
-    room("scene.stream.receiver").start(bpy.context.scene.beyond_mocap_stream)
+    room("scene.stream.follow").start_listening(bpy.context.scene.beyond_mocap_stream)
     room("scene.stream.follow").began()
 
 
@@ -328,11 +328,11 @@ def a_live_update(room, _context):
     """Throws, flights, overlays and figures are worked out in threads of their own."""
     job = room("scene.core.background").Job
     jobs = [job(room(f"scene.{name}").KIND, endless)
-            for name in ("throws.live", "passes.live", "overlays.store", "path_editing.measure")]
-    room("scene.throws.live")._seen["job"] = "body", 0, jobs[0]
+            for name in ("throws.shown", "passes.live", "overlays.store", "path_editing.live")]
+    room("scene.throws.shown")._seen["job"] = "body", 0, jobs[0]
     room("scene.passes.live")._running.append(jobs[1])
     room("scene.overlays.store")._running.append((jobs[2], "take"))
-    room("scene.path_editing.measure")._running.append((jobs[3], 0, 0))
+    room("scene.path_editing.live")._running.append((jobs[3], 0, 0))
     room("scene.core.live").soon(room("scene.timeline.strip_events")._later, 0.1)
 
 

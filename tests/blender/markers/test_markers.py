@@ -17,7 +17,7 @@ def cloud():
 
 @pytest.fixture
 def lines():
-    return importlib.import_module(f"{EXTENSION}.scene.markers.lines")
+    return importlib.import_module(f"{EXTENSION}.scene.markers.nodes")
 
 
 @pytest.fixture
@@ -261,19 +261,19 @@ def test_selected_vertices_are_assigned_to_a_segment(walk):
 
 
 def test_labels_are_written_where_markers_are_seen(walk):
-    labels = importlib.import_module(f"{EXTENSION}.scene.markers.labels")
+    labels = importlib.import_module(f"{EXTENSION}.scene.markers.cloud")
     thing = imported(walk)
     thing.location.x = 3.0
     bpy.context.scene.frame_set(5)
     bpy.context.view_layer.update()
-    found = {text: place for place, text, _ in labels.labels(bpy.context)}
+    found = {text: place for place, text, _ in labels.visible_labels(bpy.context)}
     places, seen, *_ = seen_at(thing, 5)
     names = [row.name for row in thing.beyond_mocap_cloud.labels]
     assert set(found) == {name for name, there in zip(names, seen) if there}
     for name, place in found.items():
         assert np.allclose(np.array(place) - [3.0, 0.0, 0.0], places[names.index(name)], atol=1e-5)
     bpy.context.scene.beyond_mocap_markers.names = False
-    assert not labels.labels(bpy.context)
+    assert not labels.visible_labels(bpy.context)
 
 
 def test_the_active_cloud_becomes_the_others_static_trial(walk):
@@ -328,8 +328,8 @@ def test_into_a_linked_collection_nothing_is_imported(walk, tmp_path):
 @pytest.fixture
 def session(extension):
     """What is kept of reconstructions, emptied afterwards."""
-    yield importlib.import_module(f"{EXTENSION}.scene.markers.kept")
-    importlib.import_module(f"{EXTENSION}.scene.markers.kept").clear()
+    yield importlib.import_module(f"{EXTENSION}.scene.markers.solve")
+    importlib.import_module(f"{EXTENSION}.scene.markers.solve").forget_reconstructions()
 
 
 def bone_at(body, bone, frame):
@@ -359,7 +359,7 @@ def test_reconstructing_gives_the_recipe_s_body_beside_the_cloud(cloud, core, wa
     assert_one_step(bpy.ops.beyond_mocap.reconstruct_markers)
     scene, thing = bpy.context.scene, bpy.data.objects["walk"]
     kept = thing.beyond_mocap_cloud
-    made, body = session.made(kept.made), kept.body
+    made, body = session.reconstruction_of(kept.made), kept.body
     assert made is not None and kept.figures and kept.model is not None
     motion = importlib.import_module(f"{EXTENSION}.scene.core.action").read(body, scene)
     assert motion.skeleton.names == made.motion.skeleton.names
@@ -384,7 +384,7 @@ def test_a_model_is_saved_loaded_and_used(walk, session, tmp_path):
     bpy.ops.beyond_mocap.reconstruct_markers()
     path = str(tmp_path / "model.json")
     bpy.ops.beyond_mocap.save_marker_model(filepath=path)
-    made = session.made(thing.beyond_mocap_cloud.made)
+    made = session.reconstruction_of(thing.beyond_mocap_cloud.made)
     thing.beyond_mocap_cloud.model = None
     with pytest.raises(RuntimeError, match="no model"):
         bpy.ops.beyond_mocap.save_marker_model(filepath=path)
@@ -392,7 +392,7 @@ def test_a_model_is_saved_loaded_and_used(walk, session, tmp_path):
     kept = bpy.data.objects["walk"].beyond_mocap_cloud
     assert kept.use_model
     bpy.ops.beyond_mocap.reconstruct_markers()
-    again = session.made(kept.made)
+    again = session.reconstruction_of(kept.made)
     assert np.array_equal(again.model.places, made.model.places)
     assert np.allclose(again.motion.root_positions, made.motion.root_positions, atol=1e-4)
 

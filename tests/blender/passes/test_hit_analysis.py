@@ -70,12 +70,13 @@ def test_a_bone_that_is_not_there_is_told(body, arguments, said):
 
 def test_the_picture_shows_curves_and_stretches(body, room):
     press(bpy.ops.beyond_mocap.hit_analysis)
-    graph, found = room("passes.graph"), json.loads(body.beyond_mocap_hits.found)
+    graph, found = room("passes.hits_shown"), json.loads(body.beyond_mocap_hits.found)
     pixels = graph.picture(found)
     assert pixels.shape == (graph.SIZE, graph.SIZE, 4) and np.isfinite(pixels).all()
     rows = np.flatnonzero(np.all(np.abs(pixels[30, :, :3] - graph._STRETCH) < 1e-3, axis=1))
     assert len(rows)
     low, high = found["stretches"][0]
-    assert abs(graph.frame_at(found, rows.mean() / (graph.SIZE - 1)) - 0.5 * (low + high)) < 2.0
+    share = (rows.mean() - graph._EDGE) / (graph.SIZE - 1 - 2 * graph._EDGE)
+    assert abs(share * (found["count"] - 1) - 0.5 * (low + high)) < 2.0
     fast = pixels[60 : graph.SIZE // 2, :, :3]
     assert np.abs(fast - graph._SPEED).max(axis=2).min() < 0.02, "no curve of speed"

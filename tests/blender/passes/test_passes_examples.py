@@ -168,6 +168,6 @@ def test_a_file_says_that_it_is_left_out(actor, room, core, tmp_path):
     press(bpy.ops.beyond_mocap.passes_to_json, filepath=str(tmp_path / "out.json"))
     read = core("passes.scene_json").read_scene(tmp_path / "out.json")
     assert read.passes[0].example is None and read.passes[1].example.clip == "volley_pass.bvh"
-    assert "pass 1" in room("passes.examples").left_out(settings())
+    assert "pass 1" in room("passes.order").list_lost_examples(settings())
     first().actor = None
-    assert not room("passes.examples").left_out(settings())
+    assert not room("passes.order").list_lost_examples(settings())

@@ -79,8 +79,8 @@ def test_bodies_and_ball_do_what_the_recipe_says(two, room, core):
 
 def test_what_is_drawn_is_what_is_played(two, room):
     press(bpy.ops.beyond_mocap.passes_make)
-    rally, overlay = room("passes.rally"), room("overlays.ball_paths")
-    shown = rally.of(two)
+    rally, overlay = room("passes.make"), room("overlays.ball_paths")
+    shown = rally.rally_of(two)
     ball, lines = settings().rally, settings().strikes.splitlines()
     for line, place in zip(lines, shown.strikes, strict=True):
         assert np.allclose(seen(ball, int(line.partition("\t")[0]))[:3, 3] / 100.0, place, atol=2e-3)

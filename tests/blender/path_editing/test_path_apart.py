@@ -223,7 +223,7 @@ def test_who_is_hidden_or_shows_a_rider_is_not_counted(scene, said):  # noqa: F8
 
 def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch):  # noqa: F811
     first, _ = crossing(as_strip)
-    module = part("path_editing.bystanders")
+    module = part("path_editing.keep_apart")
     monkeypatch.setattr(module.bystanders, "__defaults__", (0.0,))
     bpy.ops.beyond_mocap.path_apart()
     [line] = said[0].left

@@ -713,14 +713,14 @@ def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame
 
 def test_what_cannot_be_read_is_not_looked_at_again_and_again(scene, part, monkeypatch):
     """A rig is looked at by changing frames, and each change is seen: it must not begin anew by itself."""
-    live, carrier, errors = part("path_editing.live"), part("path_editing.carrier"), part("path_editing.source")
+    live, carrier = part("path_editing.live"), part("path_editing.carrier")
     body = walker()
     bpy.ops.beyond_mocap.edit_path()
     looks = []
 
     def fails(*_):
         looks.append(1)
-        raise errors.InputError("motion", "unreadable")
+        raise carrier.InputError("motion", "unreadable")
 
     monkeypatch.setattr(carrier.PlainCarrier, "read", fails)
     body.beyond_mocap_ride.fit = "polynomial"

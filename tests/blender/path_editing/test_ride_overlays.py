@@ -163,7 +163,7 @@ def test_figures_become_lines_with_what_is_aimed_for():
 
 def test_a_rider_at_rest_is_measured_once_and_again_when_it_was_laid_anew(monkeypatch):
     """The timer's looks, one by one; there is no window here that would call them."""
-    measure = import_module(f"{EXTENSION}.scene.path_editing.measure")
+    measure = import_module(f"{EXTENSION}.scene.path_editing.live")
     monkeypatch.setattr(measure, "REST", 0.0)
     bpy.ops.beyond_mocap.import_clips(filepath=str(SOURCE / "sample_blend" / "library" / "walking_1_2.bvh"))
     body = bpy.context.object

@@ -34,7 +34,7 @@ def recorded(part, core):
         if onto is None:
             return body
         rig = onto() if callable(onto) else rigs.rigify(onto)
-        source, options = part("rigs.source").source_of(body, scene), part("rigs.fit").BakeOptions(**wishes)
+        source, options = part("rigs.fit").source_of(body, scene), part("rigs.fit").BakeOptions(**wishes)
         bake = part("rigs.rig_bake")
         bake.lay(bake.fitted(rig, part("rigs.bone_maps").suggest(rig), source, scene, options))
         bpy.data.objects.remove(body)

@@ -26,7 +26,7 @@ SUFFIXES = {"FBX": ".fbx", "GLB": ".glb", "USD": ".usdc", "BVH": ".bvh"}
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
             for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
-                         "rigs.source", "rigs.fit", "rigs.export", "rigs.deliver")}
+                         "rigs.fit", "rigs.export", "rigs.deliver")}
 
 
 @pytest.fixture(scope="session")
@@ -133,7 +133,7 @@ def test_axes_of_engines_come_back_too(rooms, body, tmp_path, format, engine):
 
 
 def baked(rooms, rig, body, **wishes):
-    source = rooms["rigs.source"].source_of(body, bpy.context.scene)
+    source = rooms["rigs.fit"].source_of(body, bpy.context.scene)
     table = rooms["rigs.bone_maps"].suggest(rig)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
     return rooms["rigs.rig_bake"].lay(rooms["rigs.rig_bake"].fitted(rig, table, source, bpy.context.scene, options))

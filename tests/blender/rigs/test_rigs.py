@@ -27,7 +27,7 @@ FAMILIES = {"mixamo": rigs.mixamo, "unreal": rigs.unreal, "metahuman": rigs.meta
 def rooms(extension):
     return {name: importlib.import_module(f"{extension.__name__}.scene.{name}")
             for name in ("rigs.armature", "core.action", "core.channels", "rigs.bone_maps", "rigs.rig_bake",
-                         "rigs.posing", "rigs.source", "rigs.fit", "rigs.key_reduction", "rigs.rig", "rigs.rig_copy")}
+                         "rigs.control_study", "rigs.fit", "rigs.key_reduction", "rigs.rig")}
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +60,7 @@ def rigify(tmp_path_factory):
 def bake(rooms, rig, body, **wishes):
     scene = bpy.context.scene
     table = rooms["rigs.bone_maps"].suggest(rig)
-    source = rooms["rigs.source"].source_of(body, scene)
+    source = rooms["rigs.fit"].source_of(body, scene)
     options = rooms["rigs.fit"].BakeOptions(**wishes)
     return table, rooms["rigs.rig_bake"].lay(rooms["rigs.rig_bake"].fitted(rig, table, source, scene, options))
 
@@ -267,18 +267,18 @@ def test_fewer_keys_stay_within_the_tolerance(rooms, body):
 
 def test_what_is_carried_over_is_the_takes_own_contact(rooms, body):
     scene = bpy.context.scene
-    source = rooms["rigs.source"].source_of(body, scene, lambda frames: np.zeros((len(frames), 2), bool))
+    source = rooms["rigs.fit"].source_of(body, scene, lambda frames: np.zeros((len(frames), 2), bool))
     assert source.standing.shape == (60, 2) and source.start == START
 
 
 def test_nla_strips_are_baked_as_they_play(rooms, body):
-    expected = rooms["rigs.source"].source_of(body, bpy.context.scene)
+    expected = rooms["rigs.fit"].source_of(body, bpy.context.scene)
     data = body.animation_data
     action, slot = data.action, data.action_slot
     data.action = None
     strip = data.nla_tracks.new().strips.new("clip", START, action)
     strip.action_slot = slot
-    found = rooms["rigs.source"].source_of(body, bpy.context.scene)
+    found = rooms["rigs.fit"].source_of(body, bpy.context.scene)
     assert found.start == START and len(found.motion) == len(expected.motion)
     np.testing.assert_allclose(found.motion.root_positions, expected.motion.root_positions, atol=1e-5)
     assert np.abs(np.sum(found.motion.rotations * expected.motion.rotations, axis=-1)).min() > 1 - 1e-6
@@ -319,7 +319,8 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     own = rig.animation_data.action.name
     settings = choose(rig, body)
     settings.root = "SMOOTH"
-    before = {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.posing"].CHANNELS] for b in rig.pose.bones}
+    channels = rooms["rigs.control_study"].CHANNELS
+    before = {b.name: [tuple(getattr(b, c)) for c in channels] for b in rig.pose.bones}
     actions = sorted(a.name for a in bpy.data.actions)
     press(bpy.ops.beyond_mocap.bake_to_rig)
     press(bpy.ops.beyond_mocap.bake_to_rig)
@@ -327,7 +328,7 @@ def test_a_removed_bake_leaves_nothing_behind(rooms, body):
     bpy.context.scene.frame_set(START + 30)
     press(bpy.ops.beyond_mocap.unbake)
     assert rig.animation_data.action.name == own and sorted(a.name for a in bpy.data.actions) == actions
-    assert {b.name: [tuple(getattr(b, c)) for c in rooms["rigs.posing"].CHANNELS] for b in rig.pose.bones} == before
+    assert {b.name: [tuple(getattr(b, c)) for c in channels] for b in rig.pose.bones} == before
 
 
 def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
@@ -404,7 +405,8 @@ def test_a_copy_plays_nothing_and_a_bad_map_copies_nothing(rooms, body):
     data = rig.animation_data
     data.nla_tracks.new().strips.new("own", 1, data.action)
     data.action = None
-    assert len(rooms["rigs.rig_copy"].copied(rig, "twin").animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
+    twin = rooms["rigs.armature"].copy_rig(rig, "twin")
+    assert len(twin.animation_data.nla_tracks) == 0 and len(data.nla_tracks) == 1
     settings.rig.target = rig
     for number in range(2):
         player = settings.players.add()
@@ -529,6 +531,6 @@ def test_a_rig_in_an_overridden_collection_is_copied_beside_it(rooms, tmp_path):
         bpy.context.scene, bpy.context.view_layer, do_fully_editable=True
     )
     rig = next(one for one in over.all_objects if one.type == "ARMATURE")
-    twin = rooms["rigs.rig_copy"].copied(rig, "twin")
+    twin = rooms["rigs.armature"].copy_rig(rig, "twin")
     bpy.context.view_layer.update()
     assert twin.name in bpy.context.view_layer.objects

@@ -23,7 +23,7 @@ def room():
     found = lambda name: importlib.import_module(f"{EXTENSION}.scene.{name}")  # noqa: E731
     yield found
     found("stream.play").stop()
-    found("stream.receiver").stop()
+    found("stream.follow").stop_listening()
     found("stream.follow").tell()
 
 

@@ -89,7 +89,7 @@ def test_pictures_that_cannot_be_made_again_stay(study, extension, core, monkeyp
     def broken(_path, *_):
         raise core("base.errors").InputError("film", "no light")
 
-    monkeypatch.setattr(importlib.import_module(f"{extension.__name__}.scene.study.study"), "film", broken)
+    monkeypatch.setattr(importlib.import_module(f"{extension.__name__}.scene.study"), "film", broken)
     with pytest.raises(RuntimeError, match="no light"):
         bpy.ops.beyond_mocap.study_render(directory=f"{folder}/", pictures=True, again=True, **SMALL)
     assert (shown / "0001.png").read_bytes() == b"before"
@@ -110,7 +110,7 @@ def test_what_is_missing_is_told_before_anything_is_rendered(study, spoil, words
 
 @pytest.mark.parametrize("engine", ["AUTO", "EEVEE", "CYCLES", "WORKBENCH"])
 def test_every_engine_of_this_blender_takes_the_settings(extension, engine):
-    study = importlib.import_module(f"{extension.__name__}.scene.study.study")
+    study = importlib.import_module(f"{extension.__name__}.scene.study")
     scene, name = bpy.context.scene, study.engine_here(engine)
     study._settings(scene, study.Look(name, (64, 36), 25, 3))
     assert scene.render.engine == name and (scene.render.fps, scene.render.resolution_x) == (25, 64)
@@ -121,7 +121,7 @@ def test_every_engine_of_this_blender_takes_the_settings(extension, engine):
 def test_without_the_cycles_add_on_another_engine_renders(extension, engine):
     import addon_utils
 
-    study = importlib.import_module(f"{extension.__name__}.scene.study.study")
+    study = importlib.import_module(f"{extension.__name__}.scene.study")
     addon_utils.disable("cycles")
     try:
         name = study.engine_here(engine)
@@ -133,7 +133,7 @@ def test_without_the_cycles_add_on_another_engine_renders(extension, engine):
 
 
 def test_the_camera_glides_without_lag(extension):
-    followed = importlib.import_module(f"{extension.__name__}.scene.study.study").followed
+    followed = importlib.import_module(f"{extension.__name__}.scene.study").followed
     time = np.arange(90) / 30.0
     straight = np.stack([3.0 * time, 1.0 - time], axis=1)
     assert np.allclose(followed(straight, 30.0), straight, atol=1e-9)

@@ -572,7 +572,7 @@ def test_a_ball_that_a_hand_has_put_down_is_kicked_there(room):
 
 
 def test_what_is_shown_follows_its_target(room):
-    live, scene = room("throws.live"), bpy.context.scene
+    live, scene = room("throws.shown"), bpy.context.scene
     body = a_body()
     assert live.due(scene) is None
     press(bpy.ops.beyond_mocap.throw_at_target)
@@ -618,7 +618,7 @@ def followed(live, scene):
 
 @pytest.mark.parametrize("act", ["throw", "kick"])
 def test_undo_after_a_throw_has_followed(act, room):
-    live, scene = room("throws.live"), bpy.context.scene
+    live, scene = room("throws.shown"), bpy.context.scene
     a_body()
     press(getattr(bpy.ops.beyond_mocap, f"{act}_at_target"))
     for message in ("deselected", "target selected"):  # nothing of the armature changes between two steps
@@ -645,7 +645,7 @@ def test_undo_after_a_throw_has_followed(act, room):
 
 @pytest.mark.parametrize("hidden", ["hide_viewport", "excluded"])
 def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
-    targets, scene, hangs = room("throws.targets"), bpy.context.scene, an_empty((1.0, 0.0, 0.5))
+    targets, scene, hangs = room("throws.order"), bpy.context.scene, an_empty((1.0, 0.0, 0.5))
     hangs.rotation_euler.z = 0.5
     target = an_empty((4.0, 2.0, 0.3))
     target.parent = hangs
@@ -663,19 +663,19 @@ def test_a_hidden_target_stays_where_it_is_over_undo(hidden, room):
     other = an_empty((0.0, 0.0, 0.0))
     hangs.beyond_mocap_throw.target = target
     bpy.ops.ed.undo_push(message="hidden")
-    told = targets.told_by(scene, hangs.beyond_mocap_throw)
+    told = targets.target_key(scene, hangs.beyond_mocap_throw)
     other.location.x = 1.0
     bpy.ops.ed.undo_push(message="moved another")
     bpy.ops.ed.undo()
     scene = bpy.context.scene
     wish = next(thing.beyond_mocap_throw for thing in bpy.data.objects if thing.beyond_mocap_throw.target)
-    assert targets.places(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
-    assert targets.told_by(scene, wish) == told
+    assert targets.target_places(scene, wish, 1)[0] == pytest.approx(place, abs=1e-5)
+    assert targets.target_key(scene, wish) == told
 
 
 def test_a_deleted_thrower_does_not_keep_the_ball(room):
     body, other, ball = a_body(), a_body(), a_ball((0.3, 0.2, 0.11))
-    wish, earlier = body.beyond_mocap_throw, room("throws.earlier")
+    wish, earlier = body.beyond_mocap_throw, room("throws.order")
     wish.made, wish.flown = "throw", ball
     bone = room("passes.possession").bone_of(bpy.context.scene, body, "hand", "right")
     room("passes.possession").take(bpy.context.scene, ball, body, bone, 5, 30)
@@ -684,4 +684,4 @@ def test_a_deleted_thrower_does_not_keep_the_ball(room):
         bpy.ops.object.delete()
     assert earlier.flies_for(ball, other) is None
     ball.animation_data_clear()  # and by hand; its stretch is still there
-    assert earlier.way(ball, other.beyond_mocap_throw, np.array([40]))[0].to_translation().z < 2.0
+    assert earlier.way_before(ball, other.beyond_mocap_throw, np.array([40]))[0].to_translation().z < 2.0

@@ -1,6 +1,5 @@
-"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, and a camera
-that keeps at the same distance (Faustino §5.1.1). Shadows and, where there is one, the ball are what his study
-lacked."""
+"""A motion filmed by itself, as raters of a study see it: one grey body on a plain floor, the same light, a camera
+that keeps at the same distance (Faustino §5.1.1). His study lacked shadows and, where there is one, the ball."""
 
 from __future__ import annotations
 
@@ -9,16 +8,17 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+from mathutils import Vector
 
-from ...beyond_mocap.files.whole import beside, whole_folder
-from ...beyond_mocap.motion.motion import Motion
-from ...beyond_mocap.motion.track.ball_path import BallPath
-from ..core import action, channels
-from ..core.material import colour
-from ..core.measure import frames_per_second, whole_frames
-from ..core.set_aside import scene_aside
-from ..rigs import armature
-from ..stage import ball, body
+from ..beyond_mocap.files.whole import beside, whole_folder
+from ..beyond_mocap.motion.motion import Motion
+from ..beyond_mocap.motion.track.ball_path import BallPath
+from .core import action, channels
+from .core.material import colour
+from .core.measure import frames_per_second, whole_frames
+from .core.set_aside import scene_aside
+from .rigs import armature
+from .stage import ball, body
 
 SHIRT = (0.30, 0.32, 0.35)  # linear RGB, no team's
 CAMERA_FROM = (-1.1, -5.2, 0.75)  # metres from the middle of the body
@@ -51,12 +51,9 @@ def film(path: Path, motion: Motion, ball_path: BallPath | None, look: Look) -> 
         _floor(scene, motion)
         _light(scene)
         _camera(scene, motion)
-        if look.movie:
-            with beside(path, path.suffix) as part:
-                _render(scene, str(part))
-        else:
-            with whole_folder(path) as part:
-                _render(scene, f"{part}/")
+        with beside(path, path.suffix) if look.movie else whole_folder(path) as part:
+            scene.render.filepath = str(part) if look.movie else f"{part}/"
+            bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 def engine_here(wanted: str) -> str:
@@ -90,11 +87,6 @@ def _settings(scene: bpy.types.Scene, look: Look) -> None:
     if look.movie:
         render.ffmpeg.format, render.ffmpeg.codec, render.ffmpeg.constant_rate_factor = "MPEG4", "H264", "HIGH"
     render.use_stamp, render.use_file_extension = False, not look.movie  # stamps would tell files and times
-
-
-def _render(scene: bpy.types.Scene, path: str) -> None:
-    scene.render.filepath = path
-    bpy.ops.render.render(animation=True, scene=scene.name)
 
 
 def _player(scene: bpy.types.Scene, motion: Motion) -> None:
@@ -143,7 +135,7 @@ def _camera(scene: bpy.types.Scene, motion: Motion) -> None:
     camera = bpy.data.objects.new("Camera", data)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    camera.rotation_euler = _towards(-np.array(CAMERA_FROM))
+    camera.rotation_euler = Vector(-np.array(CAMERA_FROM)).to_track_quat("-Z", "Y").to_euler()
     frames = whole_frames(float(scene.frame_start), motion.duration, frames_per_second(scene))
     seconds = (frames - scene.frame_start) / frames_per_second(scene)
     way = followed(motion.root_positions[:, :2], motion.fps)
@@ -162,9 +154,3 @@ def followed(places: np.ndarray, fps: float) -> np.ndarray:
     before, after = 2.0 * places[:1] - places[half:0:-1], 2.0 * places[-1:] - places[-2 : -half - 2 : -1]
     total = np.cumsum(np.concatenate([np.zeros((1, 2)), before, places, after]), axis=0)
     return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
-def _towards(way: np.ndarray):
-    from mathutils import Vector
-
-    return Vector(way).to_track_quat("-Z", "Y").to_euler()
