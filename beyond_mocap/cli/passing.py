@@ -12,23 +12,21 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Writer, named_folder
-from .progress_reporter import Told
+from .outputs import Told, Writer, named_folder
 
 
-def add(verbs):
-    """The verb's parser."""
+def add_passes(verbs):
     verb = verbs.add_parser("passes", help="several players keep a ball going")
     verb.add_argument("scene", type=Path, metavar="SCENE.json",
                       help="who passes to whom; docs/passes/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
     verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
     add_options(verb, "library")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_passes)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`passes`: plays the scene and writes its players, its ball and what came of it."""
     from ..library.build import build
     from ..passes.passes import ball_of, passes

@@ -1,35 +1,42 @@
-"""The verb `path`: a recording rides another path."""
+"""The verb `path`: a recording rides another path, and keeps clear of bodies that are already moving: it waits a little
+or goes round, as little as it takes."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Writer, check_outputs, writer_of
-from .progress_reporter import Told
+from .outputs import Told, Writer, check_outputs, writer_of
+
+if TYPE_CHECKING:
+    from ..path_editing.follower import Change, Follower
+    from ..path_editing.ride import Ridden, RideSettings, RideSource
 
 _WHOLE = 0.95  # of a path, that is as good as all of it
+_ROUNDS = 3  # of looking for delays and detours
+_HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
 
 
-def add(verbs):
-    """The verb's parser."""
+def add_path(verbs):
     verb = verbs.add_parser("path", help="a recording rides another path")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`: hence --loop
     add_options(verb, "path_editing")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_path)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`path`: rides it, and writes what was asked for about it."""
     from ..files.bvh import bvh
 
@@ -142,12 +149,11 @@ def _apart(source, path, settings, ground, options):
     if not options.avoid:
         return settings, ()
     from ..path_editing.collisions import DISTANCE
-    from .keep_apart import clear_of, read_others
 
-    others = read_others(options.avoid)
+    others = _read_others(options.avoid)
     with _naming_files(options):
-        return clear_of(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
-                        name=options.input.name)
+        return _keep_clear(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
+                           name=options.input.name)
 
 
 @contextmanager
@@ -193,3 +199,67 @@ def _report(source, ridden, take, path, ground) -> dict:
     seams = {name: ridden_well["seam_jerk"][name] for name in ("median", "max")}
     report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}
     return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}
+
+
+def _read_others(paths: Sequence[Path]) -> list[Follower]:
+    """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
+    from ..files.bvh import bvh
+    from ..path_editing.follower import Follower
+
+    motions = [(path.name, bvh.read(path).motion) for path in paths]
+    return [
+        Follower(name=name, times=np.arange(len(motion)) / motion.fps, places=motion.root_positions - (0.0, 0.0, _HIPS))
+        for name, motion in motions
+    ]
+
+
+def _keep_clear(
+    others: list[Follower], distance: float, source: RideSource, path, settings: RideSettings, ground, name: str
+) -> tuple[RideSettings, tuple[str, ...]]:
+    """`settings` with the delay and the detours that keep the rider `distance` metres from `others`; what was asked of
+    it and what could not be resolved, one line each. name: of the rider, for the lines."""
+    from ..path_editing.apart import Limits, resolved
+    from ..path_editing.ride import ride
+
+    bare, limits = ride(source, path, replace(settings, plant=False), ground), Limits(distance)
+    me = replace(_build_follower(name, bare), path=path, arc=bare.arc, by_arc=settings.by_arc_length)
+    for _ in range(_ROUNDS):
+        change = resolved([me, *others], limits).changes[0]
+        asked = _apply_change(settings, change, bare.motion.fps)
+        rider = _build_follower(name, ride(source, path, replace(asked, plant=False), ground))
+        left = _find_collisions([rider, *others], distance)
+        if not left:
+            break
+        limits = replace(limits, distance=limits.distance + distance - min(hit.gap for hit in left) + 0.01)
+    still = (f"still comes within {hit.gap:.2f} m of {others[hit.second - 1].name} at {hit.time:.1f} s" for hit in left)
+    return asked, tuple(f"{name} {line}" for line in (*_describe_changes(asked, settings), *still))
+
+
+def _build_follower(name: str, ridden: Ridden) -> Follower:
+    from ..path_editing.follower import Follower
+
+    times = np.arange(len(ridden.motion)) / ridden.motion.fps
+    return Follower(name=name, times=times,
+                    places=np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]]))
+
+
+def _apply_change(settings: RideSettings, change: Change, fps: float) -> RideSettings:
+    """The settings with a change; riders wait for whole frames."""
+    waits = float(np.ceil(round(change.delay * fps, 3)) / fps)
+    return replace(settings, delay=settings.delay + waits, detours=change.detours)
+
+
+def _find_collisions(followers: list[Follower], distance: float) -> list:
+    """The collisions of the first body with the others."""
+    from ..path_editing.collisions import collisions
+
+    times = np.unique(np.concatenate([follower.times for follower in followers]))
+    places = np.stack([follower.at(times) for follower in followers])
+    return [hit for hit in collisions(times, places, distance) if hit.first == 0]
+
+
+def _describe_changes(asked: RideSettings, settings: RideSettings) -> list[str]:
+    waits = asked.delay - settings.delay
+    turns = (f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
+             for arc, _, offset in asked.detours)  # fmt: skip
+    return [*([f"waits {waits:.2f} s"] if waits else []), *turns]
