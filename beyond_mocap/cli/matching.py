@@ -18,7 +18,7 @@ from .outputs import Told, Writer, check_outputs, named_folder
 
 
 def add_match(verbs):
-    from ..files.events.event_providers import EVENT_PROVIDERS
+    from ..files.event_providers import EVENT_PROVIDERS
     from ..files.tracking.providers import PROVIDERS
 
     verb = verbs.add_parser("match", help="everybody's motion and the ball of a tracked match, resumable")
@@ -121,8 +121,7 @@ def add_touches(verbs):
 def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`touches`: solves the ball and writes what was asked for."""
     from ..ball.solve_ball import solve_ball
-    from ..files.tables import write_ball, write_report
-    from ..files.touches_csv import write_touches
+    from ..files.tables import write_ball, write_report, write_touches
     from ..motion.track.ball_path import BallPath
 
     begun = time.perf_counter()

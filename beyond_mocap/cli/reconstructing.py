@@ -34,7 +34,7 @@ def add_reconstruct(verbs):
 
 def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`reconstruct`: of one trial, or of all in a folder."""
-    from ..library.add_clip import plain_words
+    from ..library.keep_words import plain_words
 
     if options.model and options.static:
         raise InputError("--model", "with --static", "one of them", "leave one out")
@@ -57,7 +57,7 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     check_outputs(options.out, options.report, options.save_model, never=inputs)
     write = writer_of(options.out, writers)
     if options.add_to:
-        from ..library.add_clip import free_place
+        from ..library.keep_words import free_place
 
         check_outputs(options.out, free_place(options.add_to, options.trial.stem))
     settings = settings_of(options)
@@ -248,7 +248,7 @@ def _is_throw(words) -> bool:
 
 def add_to_library(made, name: str, options) -> list[str]:
     """The motion as a clip of a library, a throw's words at its release; notes for people."""
-    from ..library.add_clip import add_clip
+    from ..library.keep_words import add_clip
 
     key = None
     if _is_throw(options.words) and made.release is not None:

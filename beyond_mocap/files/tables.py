@@ -1,6 +1,6 @@
-"""The tables that leave and come back: provenance and ball CSVs, and the JSON report.
+"""The tables that leave and come back: the ball and its touches as CSV, and the JSON report.
 
-Every writer writes beside its target and renames, so that nobody ever sees half a file.
+Every writer writes beside its target and renames, so that half a file is never seen.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ":
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
 _LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
 
+TOUCH_COLUMNS = (
+    "time_s", "uncertainty_s", "player", "part", "kind", "x_m", "y_m", "z_m",
+    "before_x_m_s", "before_y_m_s", "before_z_m_s", "after_x_m_s", "after_y_m_s", "after_z_m_s", "confidence",
+)  # fmt: skip
+
 
 def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
     """Writes `time_s,x_m,y_m,z_m,measured`; a position that is not known leaves its cells empty."""
@@ -42,6 +47,16 @@ def read_ball(path: str | os.PathLike) -> BallPath:
     positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
     times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
     return BallPath(frozen_array(times), frozen_array(positions), frozen_array(measured, bool))
+
+
+def write_touches(path: str | os.PathLike, touches: Iterable) -> None:
+    """Writes one row for each touch (`ball.tracked.solve.SolvedTouch`), in their order."""
+    rows = (
+        (f"{touch.time:.4f}", f"{touch.uncertainty:.4f}", touch.player, touch.part, touch.kind,
+         *(f"{value:.3f}" for value in np.concatenate([touch.position, touch.before, touch.after])),
+         f"{touch.confidence:.3f}") for touch in touches
+    )  # fmt: skip
+    atomic_write(path, format_csv(TOUCH_COLUMNS, rows))
 
 
 def write_report(path: str | os.PathLike, report: dict) -> None:

@@ -14,13 +14,12 @@ from ..files.bvh import bvh
 from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, one_skeleton, repair
+from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
-from .describe_clips import described
-from .features import FPS
+from .features import FPS, describe_clips
 from .library import Library, Progress
 from .scan import Annotations, readable_clips
-from .synthetic_files import write_synthetic_clips
 
 
 def build(
@@ -91,7 +90,7 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
         one = repair.grounded(motion, standing, moved)
         mended.append(replace(one, drift=one.drift + level[number][1]))
         rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
-    notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
+    notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
     originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
     told = [repair.Mended(pops, one.drift, *one.slide) for one, (_, pops) in zip(mended, unpopped)]
     originals = [replace(clip, mended=what) for clip, what in zip(originals, told)]
@@ -138,7 +137,7 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
                               standing=ends[-1].standing, recorded=ends[-1].recorded))
         else:
             clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
-    notes += landings.told(ends, ways)
+    notes += landings.describe_landings(ends, ways)
     return clips
 
 
@@ -171,7 +170,7 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Features, words and clusters of `clips`."""
     _check(cancelled)
     report(0.7, "Describing frames")
-    frames = described(clips)
+    frames = describe_clips(clips)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
         _check(cancelled)

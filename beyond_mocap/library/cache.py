@@ -1,7 +1,7 @@
 """What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file
-read.
+read; and the synthetic clips beside it, as BVH.
 
-A damaged or stale cache is simply not used and written anew; the file is written beside its place and renamed, so two
+A damaged or stale cache is simply not used and written again; the file is written beside its place and renamed, so two
 processes that build at once do no harm: the later one wins with the same content.
 """
 
@@ -12,12 +12,14 @@ import os
 import tempfile
 from dataclasses import asdict
 from pathlib import Path
+from typing import Iterable
 
 import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..base.digest import byte_digest
 from ..base.errors import InputError
+from ..files.bvh import bvh
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clip import Clip
@@ -159,3 +161,17 @@ def _restore(header: dict, arrays: dict) -> dict:
         "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "clusters": clusters, "fps": header["fps"],
         "notes": tuple(header["notes"]),
     }  # fmt: skip
+
+
+def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
+    """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
+    them; a place that cannot be written is left alone. missing_only: those that are not there, as when someone has
+    tidied up."""
+    try:
+        for clip in made:
+            file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
+            if not clip.mirrored and not (missing_only and file.exists()):
+                file.parent.mkdir(parents=True, exist_ok=True)
+                bvh.write(file, clip.motion)
+    except OSError:
+        return

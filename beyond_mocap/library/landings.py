@@ -94,7 +94,7 @@ def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
     return replace(row, end=recorded - 1 if key is None else last, key=key)
 
 
-def told(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
+def describe_landings(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
     """What was done, in one line, where anything was."""
     if not completed_clips:
         return []

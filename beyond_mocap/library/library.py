@@ -19,13 +19,12 @@ from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError
 from ..motion.skeleton import Skeleton
 from . import cache
+from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
-from .describe_clips import described
-from .features import FPS, Frames, joined
+from .features import FPS, Frames, describe_clips, joined
 from .keys import Key, keys_of
 from .made import KICK, TAKE, TAKES_FROM, gaps, locomotion, made_clips, touch_speed
-from .synthetic_files import write_synthetic_clips
 
 Progress = Callable[[float, str], None]
 
@@ -44,7 +43,7 @@ class Gait:
 class Library:
     """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was
     decided; kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for
-    which gait, (word, path) pairs (`library.chosen`)."""
+    which gait, (word, path) pairs (`library.automatic`)."""
 
     folder: str
     skeleton: Skeleton
@@ -150,7 +149,7 @@ def _made(library: Library) -> Library:
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())
-    frames = described(clips, library.frames)
+    frames = describe_clips(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
 
 

@@ -260,7 +260,7 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     return squares.solve()[:, 0]
 
 
-def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
+def describe_repairs(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
     """What was done to a library's clips, one line per kind. repaired: each clip's repair and its number of pops."""
     lines = []
     pops = [count for _, count in repaired if count]

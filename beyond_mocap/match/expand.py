@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
-from ..library.chosen import with_chosen_gaits
+from ..library.automatic import with_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER

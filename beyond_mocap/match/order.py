@@ -9,7 +9,7 @@ from pathlib import Path
 from .. import __version__
 from ..base.errors import InputError, told_time
 from ..base.settings import defaults
-from ..files.events.event_providers import EVENT_PROVIDERS
+from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.content_digest import digest_of_file
 from .pieces.units import OVERLAP, WINDOW
 

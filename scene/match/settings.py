@@ -15,7 +15,7 @@ from bpy.props import (
     StringProperty,
 )
 
-from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
+from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..core.properties import with_settings
 from .kits import USUAL, linear, repaint, written

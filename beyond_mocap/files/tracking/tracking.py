@@ -21,11 +21,19 @@ from ..tables import number, read_rows
 from ..whole import atomic_write
 from . import match_arrays
 from .feed import Feed
-from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
-from .match_repairs import mended_ball, mended_players, mended_sides, side_lines
+from .match_repairs import (
+    check_periods,
+    check_players,
+    check_rows,
+    check_same_match,
+    mended_ball,
+    mended_players,
+    mended_sides,
+    side_lines,
+    whole_lines,
+)
 from .providers import find_feed, load_tracking
-from .referees import described_referee, referee_samples
-from .team_colours import team_colours
+from .referees import described_referee, read_team_colours, referee_samples
 
 RATES = (5.0, 100.0)
 """Samples per second that a track may have."""
@@ -150,7 +158,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
 
 def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
     """Ground, name and colour of the home and the away team."""
-    colours = team_colours(feed)
+    colours = read_team_colours(feed)
     names = {str(team.ground): str(team.name or "") for team in dataset.metadata.teams}
     return [(ground, names.get(ground, ""), colours[ground]) for ground in ("home", "away")]
 

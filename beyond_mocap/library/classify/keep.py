@@ -11,12 +11,10 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...files.whole import atomic_write
-from .act import Act
-from .classifier import Classifier
+from .classifier import Act, Classifier
 from .details import Details
 from .kernel import Kernel
-from .signals import STRIKES
-from .windows import LENGTH, Space
+from .signals import LENGTH, STRIKES, Space
 
 VERSION = 1
 NAME = "learned_words.npz"

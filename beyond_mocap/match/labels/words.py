@@ -17,7 +17,7 @@ from ...annotation.ball_contact import takes_with_foot
 from ...annotation.event_words import EventWords, read_event_words
 from ...ball.tracked import kinds
 from ...ball.tracked.solve import SolvedBall, SolvedTouch
-from ...files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ...files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ...motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned
 

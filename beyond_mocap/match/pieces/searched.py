@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from ...library.chosen import with_chosen_gaits
+from ...library.automatic import with_chosen_gaits
 from ...library.library import Library
 from ...synthesis.plan import Plan
 from ...synthesis.resolve_plan import resolve_plan

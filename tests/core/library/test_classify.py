@@ -10,11 +10,10 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.classify import confidence, keep, train
+from beyond_mocap.library.classify import keep, kernel, train
 from beyond_mocap.library.classify.examples import Example, act_of
-from beyond_mocap.library.classify.signals import signals
+from beyond_mocap.library.classify.signals import LENGTH, signals, windows
 from beyond_mocap.library.classify.train import trained
-from beyond_mocap.library.classify.windows import LENGTH, windows
 from beyond_mocap.library.proposals import propose
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place, resample
@@ -193,10 +192,10 @@ def test_an_act_is_what_is_done_not_how_one_goes():
 
 def test_confidence_follows_examples_as_far_as_there_are_some():
     score, silent = np.linspace(-1.0, 1.0, 401), np.full(401, -1.0)
-    few = confidence.calibrated(np.array([0.9, -0.9]), np.array([-1.0, -1.0]), np.array([True, False]), False)
-    assert np.allclose(few, confidence.PRIOR[False], atol=0.5)
-    many = confidence.calibrated(score, silent, score > 0.4, False)
-    assert confidence.sure(many, 0.25, -1.0) < confidence.sure(few, 0.25, -1.0)
+    few = kernel.fit_confidence(np.array([0.9, -0.9]), np.array([-1.0, -1.0]), np.array([True, False]), False)
+    assert np.allclose(few, kernel.PRIOR[False], atol=0.5)
+    many = kernel.fit_confidence(score, silent, score > 0.4, False)
+    assert kernel.compute_confidence(many, 0.25, -1.0) < kernel.compute_confidence(few, 0.25, -1.0)
 
 
 @pytest.mark.skipif(not (REAL / "annotations.csv").is_file(), reason="no recordings to measure on beside the clone")
