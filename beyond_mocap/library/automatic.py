@@ -15,7 +15,7 @@ from difflib import get_close_matches
 import numpy as np
 
 from ..annotation import DISCRETE, LOCOMOTION
-from ..annotation.gaze import direction_words, wanted_offset
+from ..annotation.gaits import direction_words, wanted_offset
 from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError
 from ..motion.track import SampledTrack
@@ -27,7 +27,7 @@ _WHERE = "--gait"
 
 def automatic_words(library: Library, gait: np.ndarray, track: SampledTrack) -> list[tuple[str, ...]]:
     """(T,) the words of each frame's gait, index (T,) into the library's; where the library also has it in the
-    direction in which a body that faces the ball would go (`annotation.gaze`), in that direction."""
+    direction in which a body that faces the ball would go (`annotation.gaits`), in that direction."""
     recorded = {row.words for clip in library.clips for row in clip.annotations}
     words: list[tuple[str, ...]] = []
     for number, direction in zip(gait, direction_words(wanted_offset(track), track.fps)):

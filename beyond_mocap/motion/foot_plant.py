@@ -24,8 +24,8 @@ from ..base.vectors import cross
 from . import quaternion
 from .contacts import sole_height
 from .humanoid import Limb, identify
+from .limb import two_bone
 from .motion import pose_kinematics
-from .reach import two_bone
 from .skeleton import Skeleton
 
 SMOOTH, PULL = 0.005, 3e-4

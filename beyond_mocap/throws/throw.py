@@ -22,10 +22,9 @@ from ..ball.physics import BALLS, FASTEST, THROWN, Ball
 from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify, stature
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, place
+from ..motion.motion import Motion, cubic_at, place
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..motion.track.ball_path import BallPath

@@ -203,7 +203,7 @@ def _root_motion(rig: bpy.types.Object, shown: _Shown, wanted: Wanted, told: lis
     (F, 4, 4); both None where they are not asked for."""
     if wanted.root == "KEEP":
         return None, None, None, None
-    from ...beyond_mocap.motion.path.root_path import ground_path
+    from ...beyond_mocap.motion.path.smooth_spline import ground_path
 
     table = bone_maps.kept(rig) or bone_maps.suggest(rig)
     at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...base.errors import InputError, TimedLine, told_time
 from ...base.runs import runs
-from .data import Track
+from .data import Track, at_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
-from .sentinels import at_sentinel
 
 FASTEST = 12.0
 """m/s; nobody runs faster, so a sample that wants it is wrong."""

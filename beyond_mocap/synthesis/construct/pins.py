@@ -20,8 +20,8 @@ from ...base.runs import runs
 from ...base.vectors import unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, heading_from_positions, identify
+from ...motion.limb import two_bone
 from ...motion.motion import Motion, pose_kinematics
-from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from .ball.carry import arm, leg
 

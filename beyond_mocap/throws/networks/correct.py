@@ -1,7 +1,7 @@
 """Two-bone inverse kinematics as one functional step: with numpy for use, with jax as a layer inside the training.
 
 The knee or elbow bends or stretches until the limb has the length that is asked for, then the whole limb turns to the
-target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `motion.reach` does the same over all frames of a finished
+target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `motion.limb` does the same over all frames of a finished
 motion; here one frame follows another, nothing may look ahead, and every step must have a derivative."""
 
 from __future__ import annotations

@@ -12,8 +12,7 @@ from ...ball.flight import Launch, fly
 from ...ball.impact import crossing
 from ...ball.physics import BASEBALL, Ball
 from ...motion import quaternion
-from ...motion.between_frames import cubic_at
-from ...motion.motion import Motion, pose_kinematics
+from ...motion.motion import Motion, cubic_at, pose_kinematics
 
 WALL = 4.0
 """m from the thrower to the target that all of his threw at, a square of 3 m (Fredriksson §8.2)."""

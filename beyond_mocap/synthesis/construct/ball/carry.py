@@ -17,9 +17,8 @@ import numpy as np
 from ....annotation.striking import Surface
 from ....motion import quaternion
 from ....motion.humanoid import Limb, identify
-from ....motion.limb import inner_angle
+from ....motion.limb import inner_angle, two_bone
 from ....motion.motion import pose_kinematics
-from ....motion.reach import two_bone
 from ....motion.skeleton import Skeleton
 
 MOST_BEND = {"head": 0.6, "chest": 0.35}
