@@ -39,9 +39,7 @@ EVENT_KINDS = (
 
 KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
-FILLED_IN = {
-    "side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",),
-}  # fmt: skip
+FILLED_IN = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",)}
 """What may stand in braces in a row's words, and the words that it becomes."""
 
 TABLE = Path(__file__).with_name("event_words.csv")

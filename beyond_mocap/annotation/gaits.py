@@ -74,11 +74,7 @@ def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray)
 
 
 def automatic_gaits(
-    speed: np.ndarray,
-    fps: float,
-    speeds: np.typing.ArrayLike,
-    thresholds: np.ndarray,
-    hysteresis: float = 0.2,
+    speed: np.ndarray, fps: float, speeds: np.typing.ArrayLike, thresholds: np.ndarray, hysteresis: float = 0.2,
     minimum: float = 0.4,
 ) -> np.ndarray:
     """(T,) index into `speeds`: the gait of every frame (Faustino §3.1.1's pseudo-code, made steady).

@@ -172,10 +172,7 @@ def _pieces(start: float, end: float, times: np.ndarray, words: Sequence[tuple[s
 
 
 def problems(
-    timeline: Timeline,
-    known_words: Iterable[str] = (),
-    start: float | None = None,
-    end: float | None = None,
+    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
     """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s
@@ -195,10 +192,7 @@ def problems(
 
 
 def validate(
-    timeline: Timeline,
-    known_words: Iterable[str] = (),
-    start: float | None = None,
-    end: float | None = None,
+    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> None:
     """Raises the first of `problems(...)` as an InputError; returns when there is none."""
@@ -287,10 +281,8 @@ def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
     pairs += [(a, b, "are at one time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [
         InputError(
-            where if b.line is None else f"{where}:{b.line}",
-            f"{_named(a)} and {_named(b)} {how}",
-            "one thing at a time",
-            "shorten one of them, or put all words on one line",
+            where if b.line is None else f"{where}:{b.line}", f"{_named(a)} and {_named(b)} {how}",
+            "one thing at a time", "shorten one of them, or put all words on one line",
         )
         for a, b, how in pairs
     ]

@@ -41,9 +41,7 @@ _BAD = {"INCOMPLETE", "OUT", "OFFSIDE", "OFF_TARGET", "POST", "BLOCKED", "SAVED"
 
 
 def read_events(
-    path: str | os.PathLike,
-    meta: str | os.PathLike | None = None,
-    provider: str | None = None,
+    path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
     match: Match | None = None,
 ) -> MatchEvents:
     """A provider's events, with the players of a tracked match.

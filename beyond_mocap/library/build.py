@@ -23,16 +23,9 @@ from .scan import Annotations, readable_clips
 
 
 def build(
-    folder: str | Path,
-    *,
-    rebuild: bool = False,
-    cache_dir: str | Path | None = None,
-    skeleton: str | Path | None = None,
-    unit: float | None = None,
-    seed: int = 0,
-    threads: int = 1,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    folder: str | Path, *, rebuild: bool = False, cache_dir: str | Path | None = None,
+    skeleton: str | Path | None = None, unit: float | None = None, seed: int = 0, threads: int = 1,
+    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> Library:
     """The library of all recordings below `folder`, from its cache where nothing has changed.
 

@@ -105,14 +105,8 @@ class Foot:
 
 
 def plant(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    fps: float,
-    sinks: float = MOST_DROP,
-    moves: np.ndarray | None = None,
-    levels: bool = True,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
+    sinks: float = MOST_DROP, moves: np.ndarray | None = None, levels: bool = True,
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 

@@ -91,15 +91,8 @@ class Reached:
 
 
 def two_bone(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    joints: tuple[int, int, int],
-    target: np.ndarray,
-    *,
-    end_rotation: np.ndarray | None = None,
-    keep_end_rotation: bool = True,
-    pole: np.ndarray | None = None,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
+    end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
     soft: float | np.ndarray = 0.01,
 ) -> Reached:
     """Local rotations with which a limb's end joint is at `target`.
@@ -125,17 +118,9 @@ def two_bone(
 
 
 def bent_limb(
-    skeleton: Skeleton,
-    places: np.ndarray,
-    world: np.ndarray,
-    joints: tuple[int, int, int],
-    target: np.ndarray,
-    *,
-    end_rotation: np.ndarray | None = None,
-    keep_end_rotation: bool = True,
-    pole: np.ndarray | None = None,
-    soft: float | np.ndarray = 0.01,
-    clear: float | np.ndarray = CLEAR_BEND,
+    skeleton: Skeleton, places: np.ndarray, world: np.ndarray, joints: tuple[int, int, int], target: np.ndarray, *,
+    end_rotation: np.ndarray | None = None, keep_end_rotation: bool = True, pole: np.ndarray | None = None,
+    soft: float | np.ndarray = 0.01, clear: float | np.ndarray = CLEAR_BEND,
 ) -> tuple[dict[int, np.ndarray], np.ndarray]:
     """As `two_bone`, of a body whose joints' places (T, J, 3) m and world rotations (T, J, 4) are known, those of the
     limb at least: the new local rotations (T, 4) by joint, and the miss (T,) m. clear, one or (T,): share of the limb's

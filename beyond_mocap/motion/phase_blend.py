@@ -144,9 +144,7 @@ def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarra
     facing, path = _at(one.facing, frames), _at(one.path, frames)
     pose[:, 0] = quaternion.multiply(quaternion.about_up(-facing), pose[:, 0])
     return {
-        "pose": pose,
-        "height": root[:, 2],
-        "sway": quaternion.turned_level(root[:, :2] - path, -facing),
+        "pose": pose, "height": root[:, 2], "sway": quaternion.turned_level(root[:, :2] - path, -facing),
         "turn": _at(np.gradient(one.facing), frames) * pace,
         "way": quaternion.turned_level(_at(np.gradient(one.path, axis=0), frames), -facing) * pace[:, None],
         "inside": _inside(one.standing, frames) / pace[:, None, None],

@@ -28,8 +28,4 @@ class Offset:
         c = 0.5 * (self.acceleration + 2.0 * rate * self.speed + rate**2 * a)
         left = np.exp(-rate * t)
         value, slope, bend = a + b * t + c * t**2, b + 2.0 * c * t, 2.0 * c
-        return Offset(
-            left * value,
-            left * (slope - rate * value),
-            left * (bend - 2.0 * rate * slope + rate**2 * value),
-        )
+        return Offset(left * value, left * (slope - rate * value), left * (bend - 2.0 * rate * slope + rate**2 * value))

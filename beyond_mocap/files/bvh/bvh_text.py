@@ -68,9 +68,7 @@ def parse_data(path: Path, data: bytes) -> BvhText:
     values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}",
-            f"{len(values)} rows of motion",
-            f"{frames} as Frames says",
+            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames} as Frames says",
             f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
@@ -130,17 +128,10 @@ class _Hierarchy:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
-            path=self.path,
-            names=tuple(self.names),
-            parents=tuple(self.parents),
-            offsets=np.array(self.offsets),
-            channels=tuple(self.channels),
-            end_parents=tuple(joint for joint, _ in ends),
-            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time=frame_time,
-            values=values,
-            first_row=first_row,
-            renamed=tuple(self.renamed),
+            path=self.path, names=tuple(self.names), parents=tuple(self.parents), offsets=np.array(self.offsets),
+            channels=tuple(self.channels), end_parents=tuple(joint for joint, _ in ends),
+            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3), frame_time=frame_time, values=values,
+            first_row=first_row, renamed=tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:

@@ -80,11 +80,8 @@ def _check_rate(track: Track, path) -> None:
 
 
 def read_match(
-    path: str | os.PathLike,
-    meta: str | os.PathLike | None = None,
-    provider: str | None = None,
-    cache_dir: str | os.PathLike | None = None,
-    pitch: tuple[float, float] | None = None,
+    path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
+    cache_dir: str | os.PathLike | None = None, pitch: tuple[float, float] | None = None,
 ) -> Match:
     """A provider's tracking file as arrays; the second time from a cache of them.
 
@@ -145,12 +142,8 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
     turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
     return {
-        "times": times,
-        "positions": positions,
-        "ball": ball,
-        "players": np.array(who, dtype=str).reshape(len(who), 5),
-        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
-        "periods": np.array(periods),
+        "times": times, "positions": positions, "ball": ball, "players": np.array(who, dtype=str).reshape(len(who), 5),
+        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]), "periods": np.array(periods),
         "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
         "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
     }
@@ -172,16 +165,9 @@ def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match
     )
     referees = (Team(REFEREE, "referees"),) if any(player.team == REFEREE for player in players) else ()
     match = Match(
-        times=frozen_array(arrays["times"]),
-        players=players,
-        positions=frozen_array(arrays["positions"]),
-        ball=frozen_array(arrays["ball"]),
-        length=length,
-        width=width,
-        fps=fps,
-        provider=feed.provider.name,
-        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
-        notes=tuple(notes),
+        times=frozen_array(arrays["times"]), players=players, positions=frozen_array(arrays["positions"]),
+        ball=frozen_array(arrays["ball"]), length=length, width=width, fps=fps, provider=feed.provider.name,
+        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()), notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
         passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
     )

@@ -115,9 +115,7 @@ def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
     score = np.zeros(len(places))
     for limb in (body.left, body.right):
         for high, low in (
-            (limb.upper_leg, limb.lower_leg),
-            (limb.lower_leg, limb.foot),
-            (limb.upper_arm, limb.lower_arm),
+            (limb.upper_leg, limb.lower_leg), (limb.lower_leg, limb.foot), (limb.upper_arm, limb.lower_arm)
         ):
             if high is not None and low is not None:
                 score += unit_vectors(places[:, low] - places[:, high], _DOWN) @ _DOWN
@@ -223,13 +221,8 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
     ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height
     positions = places - np.array([middle[0], middle[1], ground])
     return Neutral(
-        skeleton=skeleton,
-        rotations=frozen_array(world),
-        positions=frozen_array(positions),
-        leg=leg,
-        ankle_height=ankle_height,
-        ball=frozen_array(ball),
-        heel=0.065 * leg,
+        skeleton=skeleton, rotations=frozen_array(world), positions=frozen_array(positions), leg=leg,
+        ankle_height=ankle_height, ball=frozen_array(ball), heel=0.065 * leg,
         tip=float(np.mean(tips)) if tips else 0.075 * leg,
     )
 

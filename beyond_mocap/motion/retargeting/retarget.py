@@ -55,14 +55,8 @@ class Retargeter:
     """
 
     def __init__(
-        self,
-        sample: Motion,
-        skeleton: Skeleton,
-        bone_map: dict[str, str] | str | Path | None = None,
-        *,
-        example: Motion | None = None,
-        standing: np.ndarray | None = None,
-        example_standing: np.ndarray | None = None,
+        self, sample: Motion, skeleton: Skeleton, bone_map: dict[str, str] | str | Path | None = None, *,
+        example: Motion | None = None, standing: np.ndarray | None = None, example_standing: np.ndarray | None = None,
         keeps_travel: bool = False,
     ):
         """sample: frames of the recordings (their order does not matter).
@@ -319,9 +313,7 @@ def save_bone_map(path: str | Path, pairs: Pairs, source: Skeleton, target: Skel
 
 
 def pair_joints(
-    motion: Motion,
-    skeleton: Skeleton,
-    bone_map: Mapping[str, str] | str | Path | None = None,
+    motion: Motion, skeleton: Skeleton, bone_map: Mapping[str, str] | str | Path | None = None,
     example: Motion | None = None,
 ) -> Pairs:
     """The joints of `motion`'s skeleton and of `skeleton` that belong together.

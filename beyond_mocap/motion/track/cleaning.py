@@ -272,24 +272,16 @@ def _cubic(at: np.ndarray, before, after) -> np.ndarray:
         most = 3.0 * np.linalg.norm(p1 - p0) / length
         v0, v1 = (v * min(1.0, most / max(np.linalg.norm(v), 1e-9)) for v in (v0, v1))
     s = ((at - t0) / length)[:, None]
-    return (
-        p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s)
-    )
+    return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
 def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
     gaps = _gaps(track)
     warnings = _warnings(track, snaps, gaps)
     return DataReport(
-        lines=(*notes, *_replacements(track), *warnings),
-        rate=1.0 / track.interval,
-        dropped=dropped,
-        merged=merged,
-        filled=int(track.filled.sum()),
-        outliers=int(track.outlier.sum()),
-        gaps=gaps,
-        ball_unknown=int(np.count_nonzero(_no_ball(track))),
-        warnings=tuple(warnings),
+        lines=(*notes, *_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped, merged=merged,
+        filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
+        ball_unknown=int(np.count_nonzero(_no_ball(track))), warnings=tuple(warnings),
     )
 
 

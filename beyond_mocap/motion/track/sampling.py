@@ -40,16 +40,10 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
     speed = np.linalg.norm(velocity, axis=1)
     ball, ball_measured = _ball(track, times)
     return SampledTrack(
-        times=times,
-        positions=positions,
-        raw=interpolate(times, track.times[measured], track.positions[measured]),
-        velocity=velocity,
-        speed=speed,
-        direction=travel_direction(velocity, fps),
-        valid=_bridged(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)),
-        ball=ball,
-        ball_measured=ball_measured,
-        fps=float(fps),
+        times=times, positions=positions, raw=interpolate(times, track.times[measured], track.positions[measured]),
+        velocity=velocity, speed=speed, direction=travel_direction(velocity, fps),
+        valid=_bridged(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)), ball=ball,
+        ball_measured=ball_measured, fps=float(fps),
     )
 
 
