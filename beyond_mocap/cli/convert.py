@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, check_outputs
+from .outputs import Told, Writer, check_outputs, naming
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
@@ -38,14 +38,10 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
     check_outputs(options.output)
     clip = bvh.read(options.input, options.unit)
-    try:
+    with naming(options.input):
         twin = mirror(clip.motion)
-    except InputError as error:  # about a skeleton, which does not know its file
-        raise InputError(options.input, str(error)) from None
     bvh.write(options.output, twin, clip.form)
-    told.end()
-    for note in clip.notes:
-        told.note(note)
+    told.end(clip.notes)
     print(f"{options.output}: {len(clip.motion)} frames")
 
 
@@ -63,10 +59,8 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
             raise
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know their files
     notes = bvh.write(options.out, motion, target.form)
-    told.end()
-    told_of = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
-    for path, note in told_of:
-        told.note(f"{path}: {note}")
+    lines = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
+    told.end(f"{path}: {note}" for path, note in lines)
     print(f"{options.out}: {len(motion)} frames")
 
 

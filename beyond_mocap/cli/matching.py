@@ -59,9 +59,7 @@ def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
     else:
         options.apart(without(options.argv, "--scene"), told.progress, told.cancelled)
         made = result_of(order)
-    told.end()
-    for line in made.notes:
-        told.note(line)
+    told.end(made.notes)
     for player in made.failed:
         told.note(f"player {player.id} was left out: {player.reason}")
     if not made.done:
@@ -138,9 +136,7 @@ def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
     if options.report:
         seconds = {"load": loaded - begun, "solve": done - loaded}
         write_report(options.report, {**_report_touches(solved), "seconds": seconds})
-    told.end()
-    for note in solved.notes:
-        told.note(f"{options.input}: {note}")
+    told.end(f"{options.input}: {note}" for note in solved.notes)
     print(f"{options.out}: {len(solved.touches)} touches in {solved.times[-1] - solved.times[0]:.1f} s")
 
 

@@ -7,7 +7,8 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..base.errors import Cancelled, InputError
@@ -42,11 +43,13 @@ class Told:
         """Tells something that the user should know, on the stream of the progress."""
         print(json.dumps({"note": text}) if self._json else f"note: {text}", file=self._stream, flush=True)
 
-    def end(self) -> None:
-        """Clears the bar."""
+    def end(self, notes: Iterable[str] = ()) -> None:
+        """Clears the bar and writes the notes."""
         if self._last:
             print("\r" + " " * 80 + "\r", end="", file=self._stream, flush=True)
             self._last = ""
+        for text in notes:
+            self.note(text)
 
     def cancel(self) -> None:
         """Asks the work to stop."""
@@ -60,6 +63,18 @@ class Told:
         """Raises Cancelled where the user wants out."""
         if self.cancelled():
             raise Cancelled("cancelled")
+
+
+@contextmanager
+def naming(path):
+    """What is wrong with what a file holds is reported with the file: skeletons, motions and scenes do not know theirs.
+    path: or words for several files."""
+    try:
+        yield
+    except InputError as error:
+        if error.where.startswith(str(path)):
+            raise
+        raise InputError(path, str(error)) from None
 
 
 def writer_of(out: Path, writers: Mapping[str, Writer]) -> Writer:
@@ -119,3 +134,20 @@ def add_own_verbs(verb, dest: str, *adders: Callable):
         add_one(own).add_argument("--json", action="store_true", default=argparse.SUPPRESS,
                                   help="progress as JSON lines on stderr")  # fmt: skip
     return verb
+
+
+def build_take(motion, clip: str, method: str, **known):
+    """A motion that is one clip, played frame by frame, as a take, for writers of other forms than BVH. known: fields
+    of the take that say more than that."""
+    import numpy as np
+
+    from ..annotation import Timeline
+    from ..synthesis.take import Take
+
+    count = len(motion)
+    usual = dict(
+        start_time=0.0, clip=np.zeros(count, int), clip_frame=np.arange(count, dtype=float), keys=(), ball=None, seed=0,
+        mirrored=np.zeros(count, bool), words=((),) * count, contacts=np.zeros((count, 2), bool),
+        seams=np.zeros(0, int), timeline=Timeline(),
+    )  # fmt: skip
+    return Take(motion=motion, clips=(clip,), method=method, **{**usual, **known})

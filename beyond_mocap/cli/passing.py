@@ -12,7 +12,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, named_folder
+from .outputs import Told, Writer, named_folder, naming
 
 
 def add_passes(verbs):
@@ -35,23 +35,21 @@ def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
     begun = time.perf_counter()
     _check_folder(options.out)
     scene = read_scene(options.scene)
-    with _naming(options.scene):
+    with naming(options.scene):
         ball_of(scene)
     library = build(
         options.library, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
         progress=lambda share, text: told.progress(0.3 * share, text), cancelled=told.cancelled,
     )
     loaded = time.perf_counter()
-    with _naming(options.scene):
+    with naming(options.scene):
         played = passes(library, scene, lambda share, text: told.progress(0.3 + 0.65 * share, text), told.cancelled)
     done = time.perf_counter()
     told.check()
     table = strikes(library, played)
     report = {**_report(played, table), "seconds": {"load": loaded - begun, "play": done - loaded}}
     _write(options.out, played, table, report)
-    told.end()
-    for line in played.warnings:
-        told.note(f"{options.scene}: {line}")
+    told.end(f"{options.scene}: {line}" for line in played.warnings)
     names = {player.name for player in played.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
@@ -59,20 +57,6 @@ def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
     print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
-
-
-class _naming:
-    """What is wrong with a scene is told with its file."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, trace):
-        if isinstance(error, InputError) and not error.where.startswith(str(self._path)):
-            raise InputError(self._path, str(error)) from None
 
 
 def _check_folder(folder: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,7 +15,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Told, Writer, check_outputs, writer_of
+from .outputs import Told, Writer, build_take, check_outputs, writer_of
 
 _MOST_LINES = 12
 
@@ -218,21 +219,13 @@ def _with_file(error: InputError, options) -> InputError:
 
 def as_take(made):
     """The reconstruction as a take, for those who write takes: Blender's formats too."""
-    from ..annotation import Timeline
-    from ..motion.contacts import points
-    from ..synthesis.take import Take
+    from ..motion.contacts import detect
 
-    count = len(made.motion)
-    try:
-        contacts = points(made.motion).all(axis=2)
-    except InputError:  # no legs
-        contacts = np.zeros((count, 2), bool)
-    return Take(
-        motion=made.motion, start_time=made.trial.start, clips=(made.raw.name,), clip=np.zeros(count, int),
-        clip_frame=np.arange(count, dtype=float), mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=contacts, seams=np.zeros(0, int), timeline=Timeline(), keys=(),
-        ball=None if made.release is None else made.release.path, method="reconstruct", seed=0, warnings=made.warnings,
-    )  # fmt: skip
+    known = {} if made.release is None else {"ball": made.release.path}
+    with suppress(InputError):  # no legs
+        known["contacts"] = detect(made.motion)
+    return build_take(made.motion, made.raw.name, "reconstruct", start_time=made.trial.start, warnings=made.warnings,
+                      **known)
 
 
 def summary(made) -> str:
@@ -288,9 +281,7 @@ def run_release(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write_report(options.report, {**report, "seconds": {"load": loaded - begun, "release": done - loaded}})
     if options.ball_csv:
         write_ball(options.ball_csv, found.path)
-    told.end()
-    for note in found.notes:
-        told.note(f"{options.trial}: {note}")
+    told.end(f"{options.trial}: {note}" for note in found.notes)
     radar = ""
     if found.radar is not None:
         radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Told, Writer, check_outputs, writer_of
+from .outputs import Told, Writer, build_take, check_outputs, naming, writer_of
 
 if TYPE_CHECKING:
     from ..path_editing.follower import Change, Follower
@@ -71,9 +70,7 @@ def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
     else:
         write(take, options.out)
     _write_tables(options, take, report)
-    told.end()
-    for note in (*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)):
-        told.note(note)
+    told.end((*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)))
     gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} "
           f"m{_unit(clip, options)}")
@@ -111,14 +108,10 @@ def _path(options):
     from ..path_editing.path_csv import read_curve
 
     points = read_curve(options.path)
-    try:
+    with naming(options.path):
         if options.control_points:
             return path_line.b_spline(points, options.control_degree or 3)
         return path_line.through(points, str(options.path), closed=options.closed)
-    except InputError as error:
-        if error.where.startswith(str(options.path)):
-            raise
-        raise InputError(options.path, str(error)) from None  # points do not know their file
 
 
 def _ground(options):
@@ -138,10 +131,8 @@ def _prepared(motion, options):
     settings = RideSettings(
         fit="polynomial" if options.degree else "spline", **option_values(RideSettings, options, "path_editing")
     )
-    try:
+    with naming(options.input):
         return prepare(motion, settings), settings
-    except InputError as error:
-        raise InputError(options.input, str(error)) from None  # a motion does not know its file
 
 
 def _apart(source, path, settings, ground, options):
@@ -151,35 +142,21 @@ def _apart(source, path, settings, ground, options):
     from ..path_editing.collisions import DISTANCE
 
     others = _read_others(options.avoid)
-    with _naming_files(options):
+    with naming(f"{options.input} on {options.path}"):
         return _keep_clear(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
                            name=options.input.name)
 
 
-@contextmanager
-def _naming_files(options):
-    """A ride does not know its files: errors are told with them."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{options.input} on {options.path}", str(error)) from None
-
-
 def _ridden(source, path, settings, ground, options):
     """What was ridden, and the same as a take."""
-    from ..annotation import Timeline
     from ..path_editing.path_ride import carried
     from ..path_editing.ride import ride
-    from ..synthesis.take import Take
 
-    with _naming_files(options):
+    with naming(f"{options.input} on {options.path}"):
         ridden = ride(source, path, settings, ground)
-    count = len(ridden.motion)
-    take = Take(
-        motion=ridden.motion, start_time=0.0, clips=(options.input.name,), clip=np.zeros(count, int),
-        clip_frame=ridden.frames, mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=carried(ridden).all(axis=2), seams=np.asarray(ridden.seams, int), timeline=Timeline(), keys=(),
-        ball=None, method="ride", seed=0, warnings=tuple(ridden.warnings), correction=ridden.correction,
+    take = build_take(
+        ridden.motion, options.input.name, "ride", clip_frame=ridden.frames, contacts=carried(ridden).all(axis=2),
+        seams=np.asarray(ridden.seams, int), warnings=tuple(ridden.warnings), correction=ridden.correction,
         ik_miss=ridden.miss,
     )  # fmt: skip
     return ridden, take

@@ -156,9 +156,7 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write_report(options.report, study_report(found))
     if page:
         atomic_write(options.html, page)
-    told.end()
-    for note in found.notes:
-        told.note(note)
+    told.end(found.notes)
     for one in found.findings:
         said = "more natural" if one.better else "not shown to be more natural"
         print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")

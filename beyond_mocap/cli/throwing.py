@@ -10,10 +10,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .. import __version__
 from ..base.errors import InputError, told_time
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, add_own_verbs, check_outputs, writer_of
+from .outputs import Told, Writer, add_own_verbs, build_take, check_outputs, naming, writer_of
 
 if TYPE_CHECKING:
     from ..library.library import Library
@@ -112,16 +114,16 @@ def run_synthesize(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
         notes += [f"{options.out}: {note}" for note in bvh.write(options.out, thrown.motion, form)]
     else:
-        write(_take(thrown), options.out)
+        still = np.zeros((len(thrown.motion), 2))
+        write(build_take(thrown.motion, "throw", "throw", start_time=thrown.start_time, ball=thrown.path,
+                         warnings=thrown.warnings, correction=still, ik_miss=still), options.out)  # fmt: skip
     if options.ball:
         write_ball(options.ball, thrown.path)
     if options.report:
         seconds = {"load": loaded - begun, "throw": done - loaded}
         write_report(options.report, {"version": __version__, "seed": options.seed, **thrown.report(),
                                       "warnings": notes, "seconds": seconds})  # fmt: skip
-    told.end()
-    for note in notes:
-        told.note(note)
+    told.end(notes)
     verb = "struck" if thrown.grip is None else "released"
     print(
         f"{options.out}: {len(thrown.motion)} frames, {verb} at {thrown.release_time:.3f} s with {thrown.speed:.1f} "
@@ -164,10 +166,8 @@ def _skeleton(options, player):
     from ..motion.humanoid import identify
 
     clip = bvh.read(options.skeleton, options.unit)
-    try:
+    with naming(options.skeleton):
         identify(clip.motion.skeleton)
-    except InputError as error:  # skeletons do not know their files
-        raise InputError(options.skeleton, str(error)) from None
     return clip.motion.skeleton, clip.form
 
 
@@ -182,23 +182,6 @@ def _order(options, player):
         target=options.target, limb=options.limb, speed=options.speed, ball=options.kind, start=options.start,
         over=over, ball_place=options.ball_place, release_time=options.time, fps=fps, seed=options.seed,
     )
-
-
-def _take(thrown):
-    """The throw as a take, for writers of other forms than BVH."""
-    import numpy as np
-
-    from ..annotation import Timeline
-    from ..synthesis.take import Take
-
-    count = len(thrown.motion)
-    return Take(
-        motion=thrown.motion, start_time=thrown.start_time, clips=("throw",), clip=np.zeros(count, int),
-        clip_frame=np.arange(count, dtype=float), mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=np.zeros((count, 2), bool), seams=np.zeros(0, int), timeline=Timeline(), keys=(), ball=thrown.path,
-        method="throw", seed=0, warnings=thrown.warnings, correction=np.zeros((count, 2)),
-        ik_miss=np.zeros((count, 2)),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,8 +217,6 @@ class _Player:
 
     def place(self, at: float) -> tuple[float, ...]:
         """(2,) m: where the track is at that second."""
-        import numpy as np
-
         track = self.plan.sampled(self.plan.fps)
         return tuple(float(np.interp(at, track.times, column)) for column in track.positions.T)
 

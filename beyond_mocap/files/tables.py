@@ -102,11 +102,12 @@ def read_rows(
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) < len(names):
-                raise InputError(
-                    place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row"
-                )
+                expected = f"{len(names)} as in the header"
+                raise InputError(place, f"{len(cells)} cells", expected, "complete or delete the row")
             cells = [cell.strip() for cell in cells]
-            yield place, dict(zip(names, cells if separator == "," else map(_with_point, cells)))
+            if separator != ",":
+                cells = [_WITH_COMMA.sub(r"\1.\2", cell) for cell in cells]
+            yield place, dict(zip(names, cells))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
 
@@ -155,10 +156,6 @@ def _named(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
     return [others[name] if name in others and others[name] not in names else name for name in names]
 
 
-def _with_point(cell: str) -> str:
-    return _WITH_COMMA.sub(r"\1.\2", cell)
-
-
 def _missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
     return [name for name in required if name not in names]
 
@@ -179,18 +176,7 @@ def parse_column(rows, name: str, blank: bool = False) -> np.ndarray:
 
 
 def parse_flags(rows, name: str) -> np.ndarray:
-    """Reads a column of 0 and 1.
-
-    Args:
-        rows: (place, row) pairs as `read_rows` yields them.
-        name: of the column.
-
-    Returns:
-        (N,) bool.
-
-    Raises:
-        InputError: where a cell holds anything else.
-    """
+    """(N,) bool: a column of 0 and 1 of rows as `read_rows` yields them. InputError for any other cell."""
     for place, row in rows:
         if row[name] not in ("0", "1"):
             raise InputError(place, f"{name} {row[name]!r}", "0 or 1")

@@ -11,7 +11,6 @@ from typing import Callable, Iterable
 from ..annotation import ClipAnnotation
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
-from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, one_skeleton, repair
 from .cache import write_synthetic_clips
@@ -75,7 +74,8 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
     read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
     notes += _unit_notes(read)
-    carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
+    example = bvh.read(chosen, unit).motion if chosen is not None else None
+    carried = one_skeleton.bring(paths, [motion for motion, _ in level], example, notes)
     mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
@@ -132,11 +132,6 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
             clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
     notes += landings.describe_landings(ends, ways)
     return clips
-
-
-def _chosen(path: Path | None, unit: float | None) -> Motion | None:
-    """The recording whose skeleton the user chose."""
-    return bvh.read(path, unit).motion if path is not None else None
 
 
 def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:

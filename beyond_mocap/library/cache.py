@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Iterable
 
@@ -30,10 +30,7 @@ from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
 VERSION = 24
-_FRAME_ARRAYS = (
-    "clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean",
-    "basis", "words",
-)
+_FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
@@ -97,22 +94,14 @@ def save(place: Path, key: str, library, name: str = "library") -> bool:
 def _header(key: str, library) -> dict:
     skeleton = library.skeleton
     return {
-        "key": key,
-        "names": skeleton.names,
-        "parents": skeleton.parents,
-        "end_parents": skeleton.end_parents,
-        "vocabulary": library.frames.vocabulary,
-        "fps": library.fps,
-        "notes": library.notes,
+        "key": key, "names": skeleton.names, "parents": skeleton.parents, "end_parents": skeleton.end_parents,
+        "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
         "lengths": list(library.clusters),
         "clips": [
-            [
-                clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
-                clip.recorded, asdict(clip.mended) if clip.mended else None,
-            ]
-            for clip in library.clips
+            [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
+             clip.recorded, asdict(clip.mended) if clip.mended else None] for clip in library.clips
         ],
-    }
+    }  # fmt: skip
 
 
 def load(place: Path, key: str, name: str = "library") -> dict | None:
@@ -138,9 +127,8 @@ def load(place: Path, key: str, name: str = "library") -> dict | None:
 
 def _restore(header: dict, arrays: dict) -> dict:
     """The fields of a library but its folder."""
-    skeleton = Skeleton(
-        header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
-    )
+    names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
+    skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
     clips, start = [], 0
     for path, mirrored, fps, count, rows, recorded, mended in header["clips"]:
         part = slice(start, start + count)

@@ -3,9 +3,9 @@
 
 A block of B frames starts at every frame of a clip that has B frames left. Its place is the augmented feature vector:
 the frames' features, one after the other. We take eight frames of each block (every fourth of 32, every second of 16,
-all of
-8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say the same,
-and the clusters come out within a percent of those in all dimensions in a tenth of the time (../shared/perf.md §3).
+all of 8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say
+the same, and the clusters come out within a percent of those in all dimensions in a tenth of the time
+(../shared/perf.md §3).
 """
 
 from __future__ import annotations

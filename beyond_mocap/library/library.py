@@ -216,9 +216,6 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
 def gait_word(row: ClipAnnotation) -> str | None:
     """The gait that a row shows and nothing else, but for a direction; None of a key moment, an action or a dribble."""
     words = [word for word in row.words if word in LOCOMOTION]
-    alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0]} - _DIRECTIONS
+    alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0], *DIRECTIONS}
     return words[0] if alone else None
-
-
-_DIRECTIONS = frozenset(DIRECTIONS)
 

@@ -106,8 +106,7 @@ def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[
     speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
-        for key in keys
-        if act <= key.words and not clips[key.clip].made
+        for key in keys if act <= key.words and not clips[key.clip].made
     ]
     return float(max(found)) if found else np.inf
 
@@ -134,8 +133,7 @@ def made_clips(
 
 def upright_example(clips: Sequence) -> Motion:
     """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way
-    this skeleton
-    stands. A single recording of a run leans, and made running would lean twice."""
+    this skeleton stands. A single recording of a run leans, and made running would lean twice."""
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored
     ]

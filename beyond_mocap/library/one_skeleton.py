@@ -34,7 +34,7 @@ def bring(
     Heels and toes stand where the recording's own do; where only the new body has toes they are looked for on it.
     Raises InputError, naming the file, for a clip whose legs cannot be found.
     """
-    standing = [_standing(path, motion) for path, motion in zip(paths, motions)]
+    standing = [_named(path, lambda: contacts.points(motion)) for path, motion in zip(paths, motions)]
     groups = _groups(motions)
     skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
     home = [i for i, motion in enumerate(motions) if motion.skeleton.same_bones(skeleton, SAME_BONES)]
@@ -91,10 +91,6 @@ def _brought(motions, standing, skeleton: Skeleton, rigs) -> Iterator[tuple[Moti
 def _standing_there(there: Motion, skeleton: Skeleton, points: np.ndarray) -> np.ndarray:
     """Heels and toes that stand (T, 2, 2): the recording's own `points`; where only the new body has toes, its own."""
     return contacts.points(there) if _has_toes(there.skeleton) and not _has_toes(skeleton) else points
-
-
-def _standing(path: Path, motion: Motion) -> np.ndarray:
-    return _named(path, lambda: contacts.points(motion))
 
 
 def _named(path: Path, work):

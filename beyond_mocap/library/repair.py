@@ -147,7 +147,8 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
         motion, travel = _travelled(motion, standing)
     if slid or plants:
         motion = held(motion, standing)
-    return Repaired(motion=_on_floor(motion), standing=standing, drift=drift, travel=travel,
+    level = motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)]
+    return Repaired(motion=replace(motion, root_positions=level), standing=standing, drift=drift, travel=travel,
                     slide=(before, slide(motion, standing)), slid=slid)
 
 
@@ -182,11 +183,6 @@ def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
     weight = _inner(standing[..., 1])
     firm = np.minimum(weight[1:], weight[:-1])
     return float((speed * firm).sum() / max(firm.sum(), 1e-9))
-
-
-def _on_floor(motion: Motion) -> Motion:
-    floor = contacts.ground_height(motion)
-    return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
 
 
 def _balls(motion: Motion) -> np.ndarray:
