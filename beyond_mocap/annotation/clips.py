@@ -19,8 +19,7 @@ _COLUMNS = ("file", "start_frame", "end_frame", "key_frame", "labels")
 @dataclass(frozen=True)
 class ClipAnnotation:
     """Words for a stretch of one clip. start, end: 0-based frames in the clip's own rate, end inclusive. key: the frame
-    of the key moment (the foot meets the ball), None for continuous motions. words: from root to leaf plus
-    modifiers."""
+    of the key moment (the foot meets the ball), None for none. words: from root to leaf plus modifiers."""
 
     start: float
     end: float
@@ -76,8 +75,7 @@ def _owner(key: KeyMoment, spans: list[Span]) -> Span | None:
 
 
 def _actions(item: Span | KeyMoment) -> set[str]:
-    """The words that name what is done: App. A's discrete roots, or all words where there is none ("slide", user
-    words)."""
+    """The words that name what is done: App. A's discrete roots, or all words without any ("slide", user words)."""
     words = set(item.words)
     return words & DISCRETE or words
 

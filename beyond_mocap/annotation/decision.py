@@ -49,8 +49,7 @@ class Walk:
 
 @dataclass(frozen=True)
 class Held:
-    """What a library holds: the word combinations of its key moments and those of its frames, mirrored ones
-    included."""
+    """What a library holds: the word combinations of its key moments and of its frames, with mirrored ones."""
 
     moments: tuple[frozenset[str], ...]
     spans: tuple[frozenset[str], ...]
@@ -75,8 +74,7 @@ class Option:
 
 
 def options(walk: Walk, held: Held | None = None) -> tuple[Option, ...]:
-    """What can be chosen next, by page and digit. held: None where no library is built; then nothing is known to be
-    missing."""
+    """What can be chosen next, by page and digit. held: None without a library; then nothing is missing."""
     return tuple(_option(word, place, walk, held) for place, word in enumerate(_layout(walk, held)) if word)
 
 

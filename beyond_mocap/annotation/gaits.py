@@ -40,8 +40,7 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
 
     Faustino §3.1.1 prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed; the sign is turned
     here so that omega = 4 puts the threshold a quarter of the way up, as the text explains ("to limit the usage of
-    slower locomotion mocaps on higher movement speed"). The step up from a gait below STANDING_SPEED is never lower
-    than that.
+    slower locomotion mocaps on higher movement speed"). The step up from standing is never below STANDING_SPEED.
     """
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
@@ -83,8 +82,7 @@ def automatic_gaits(
     thresholds: (G-1,) m/s (`gait_thresholds`, `recorded_thresholds`).
     hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
     gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
-    noise). minimum: seconds a gait lasts at least; shorter ones go to the neighbour that is nearer in gait, then to the
-    longer one.
+    noise). minimum: seconds a gait lasts at least; shorter ones go to the nearer neighbour, then the longer.
     """
     speed = np.asarray(speed, dtype=float)
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)

@@ -46,8 +46,7 @@ class Surface:
 
 
 def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
-    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where the skeleton lacks
-    it."""
+    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where there is none."""
     body = identify(skeleton)
     if part == "foot":
         return tuple(_foot(skeleton, side, getattr(body, side)) for side in sides)

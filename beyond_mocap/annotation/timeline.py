@@ -89,8 +89,7 @@ class KeyMoment:
 
 @dataclass(frozen=True)
 class Timeline:
-    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion
-    throughout."""
+    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion."""
 
     spans: tuple[Span, ...] = ()
     keys: tuple[KeyMoment, ...] = ()
@@ -141,8 +140,7 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
 
     times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words
     and key moments stay as they are; the others are replaced by one span per stretch of equal automatic words. A
-    stretch runs from its first frame to the next stretch's; the last ends at the last frame, which has no stretch of
-    its own.
+    stretch runs from its first frame to the next stretch's; the last ends at the last frame.
     """
     times = np.asarray(times, dtype=float)
     if not len(times):
@@ -175,12 +173,10 @@ def problems(
     timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
-    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s
-    list.
+    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown.
 
     known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time
-    in seconds, None where there is no track to compare with. where: the file, for `file:line:` in front of each
-    message.
+    in seconds, None where there is no track to compare with. where: the file, for messages.
     """
     known = vocabulary_words(known_words)
     found: list[InputError] = []

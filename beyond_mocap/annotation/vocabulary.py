@@ -68,8 +68,7 @@ def relatives(word: str) -> frozenset[str]:
 def words_below(words: Iterable[str]) -> tuple[str, ...]:
     """What the tree offers next after `words`, in the tree's order: all children of the deepest places they reach.
 
-    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, outside, top,
-    volley.
+    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, top ....
     """
     asked = set(words)
     reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]

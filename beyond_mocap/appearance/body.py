@@ -1,5 +1,4 @@
-"""A low-poly soccer player that fits any humanoid skeleton: shirt, shorts, socks, boots, head, hands, with skin
-weights.
+"""A low-poly soccer player that fits any humanoid skeleton: kit, boots, head, hands, with skin weights.
 
 Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the
 body faces +X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two
@@ -75,8 +74,7 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
-    """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (...,
-    J, 4).
+    """Vertices (..., V, 3), metres, of the body with joints at `places` (..., J, 3), turned by `world` (..., J, 4).
 
     Linear blend skinning, as Blender's armature modifier does without volume preservation.
     """
@@ -116,8 +114,7 @@ class _Build:
 
     def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
         """A closed tube. rings: rows (centre (3,), radius along the first axis, along the second). follows: per ring
-        (joint, joint, share of the second). materials: one per gap between rings, the first and last also for the
-        caps."""
+        (joint, joint, share of the second). materials: one per gap between rings, the end ones also for the caps."""
         first, second = (np.array(axis, dtype=float) for axis in across)
         angle = 2.0 * np.pi * np.arange(sides) / sides
         circle = np.cos(angle)[:, None, None] * first, np.sin(angle)[:, None, None] * second
@@ -150,8 +147,7 @@ class _Build:
                 self.material.append(material)
 
     def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
-        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half and half with `other` where
-        given."""
+        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half with `other` where given."""
         rings = [
             (centre + self.scale * np.array([0, 0, -radii[2] * np.cos(a)]), radii[0] * np.sin(a), radii[1] * np.sin(a))
             for a in np.radians([25, 55, 90, 125, 155])

@@ -1,7 +1,6 @@
 """A small picture of one pose: the low-poly body on transparent ground, drawn with numpy alone.
 
-Faces are filled from far to near, at twice the size, and averaged down: no window, no graphics card, the same pixels
-everywhere.
+Faces are filled from far to near, at twice the size, and averaged down: no graphics card, the same pixels everywhere.
 """
 
 from __future__ import annotations

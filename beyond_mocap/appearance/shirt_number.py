@@ -19,8 +19,7 @@ _MIDDLE = {"back": 0.70, "chest": 0.74}  # share of the shirt's height, from its
 
 @dataclass(frozen=True, eq=False)
 class OnShirt:
-    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) metres, joints (N, 6) and weights (N, 6) that sum
-    to 1."""
+    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) m, joints (N, 6), weights (N, 6), in sum 1."""
 
     vertices: np.ndarray
     joints: np.ndarray
@@ -34,8 +33,7 @@ def on_shirt(
     "back" or "chest", of a person who stands.
 
     body: of `low_poly_body` with the same `example`. Each point takes place and weights of the triangle of cloth behind
-    it, so it stays on the shirt in every pose. Points beside the shirt are put on its edge. InputError where the body
-    has no shirt.
+    it, so it stays on the shirt in every pose; points beside it are put on its edge. InputError for a body without one.
     """
     neutral = neutral_stance(skeleton, example)
     standing = deformed(body, skeleton, neutral.positions, neutral.rotations)
@@ -75,8 +73,7 @@ def _widest(standing: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or comes nearest to it, and barycentric shares
-    (N, 3)."""
+    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or is nearest, and barycentric shares (N, 3)."""
     origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = cross_level(first, second)
     away = points[:, None] - origin

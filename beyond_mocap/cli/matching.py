@@ -83,8 +83,7 @@ def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
 
 
 def without(arguments: Sequence[str], option: str) -> list[str]:
-    """A command line without a long option of one value, whichever way it is written: shortened too, as argparse takes
-    it."""
+    """A command line without a long option of one value, however it is written: shortened too, as argparse takes it."""
     kept, rest = [], iter(arguments)
     for one in rest:
         name, equals, _ = one.partition("=")

@@ -27,8 +27,7 @@ class MatchEvent:
     time: s from the begin of its period, on the events' own clock. period: 1 for the first. player: the tracking's id,
     "" where he is not known. team: "home", "away" or "". kind: of `annotation.event_words.KINDS`. part: "foot",
     "head", "chest", "hand" or "". side: "left", "right" or "". details: further words ("throw-in", "lost"). said: how
-    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, NaN where
-    unknown.
+    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, or NaN.
     """
 
     time: float

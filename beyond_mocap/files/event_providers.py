@@ -81,8 +81,7 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
 
 
 def load_events(path: Path, provider: EventProvider, meta: Path | None):
-    """kloppy's dataset in the provider's own coordinates. InputError where kloppy is not installed or cannot read the
-    files."""
+    """kloppy's dataset in the provider's own coordinates. InputError without kloppy, and where it cannot read them."""
     known = {"events": str(path), "meta": str(meta)}
     arguments = {key: known[name] for key, name in provider.arguments.items()}
     others = f" and their {meta.name}" if meta else ""

@@ -40,8 +40,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lines(path) -> Iterator[tuple[str, list[str]]]:
-    """(place, words) of every line that says something; place is `file:line`. A line that ends in a backslash goes
-    on."""
+    """(place, words) of every line that says something; place is `file:line`. A backslash at a line's end goes on."""
     held: list[str] = []
     for count, line in enumerate(_text(path).split("\n"), 1):
         line = line.partition("#")[0].rstrip()

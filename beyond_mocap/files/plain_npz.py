@@ -71,8 +71,7 @@ def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
 
 
 def header_text(arrays: dict[str, np.ndarray], page: str) -> str:
-    """The text of a file, which is taken out of its arrays. InputError where it is none; `page` of the docs describes
-    it."""
+    """The text of a file, which is taken out of its arrays. InputError where it is none; `page`: of the docs."""
     header = arrays.pop(HEADER)
     if header.dtype != np.uint8:
         raise InputError("the file", "an .npz of something else", f"a text under {HEADER!r}", f"see {page}")

@@ -86,8 +86,7 @@ def read_rows(
     """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
 
     others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
-    counts; with others than a comma, a comma in a number is its decimal point, as spreadsheets of many countries have
-    it.
+    counts; with others than a comma, a comma in a number is its decimal point, as in many countries.
 
     InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
     """
@@ -113,8 +112,7 @@ def read_rows(
 
 
 def number(text: str, name: str, place: str, blank: bool = False) -> float:
-    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names the column and the
-    place."""
+    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names column and place."""
     if blank and text.lower() in ("", "nan"):
         return math.nan
     try:

@@ -65,8 +65,7 @@ def own_folder(base: Path, folder: Path) -> Path:
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:
-    """Writes `library` as `place`/`name`.npz and says whether it could; a place that cannot be written is left
-    alone."""
+    """Writes `library` as `place`/`name`.npz and says whether it could; a place that it cannot write is left alone."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
         for part in ("start", "label", "medoid"):
@@ -153,8 +152,7 @@ def _restore(header: dict, arrays: dict) -> dict:
 
 def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
     """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
-    them; a place that cannot be written is left alone. missing_only: those that are not there, as when someone has
-    tidied up."""
+    them; a place that cannot be written is left alone. missing_only: those that are not there."""
     try:
         for clip in made:
             file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)

@@ -49,8 +49,7 @@ def block_starts(frames: Frames, length: int) -> np.ndarray:
 
 
 def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
-    """k-means of all blocks of one length into 100 clusters (fewer where there are fewer blocks); empty where none
-    fits."""
+    """k-means of all blocks of one length into 100 clusters (fewer of fewer blocks); empty where none fits."""
     start = block_starts(frames, length)
     if not len(start):
         nothing = np.zeros(0, int)

@@ -31,8 +31,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Gait:
-    """A kind of locomotion that the library holds: its word, all words of its most common row, and mean speed in
-    m/s."""
+    """A kind of locomotion of the library: its word, all words of its most common row, and mean speed in m/s."""
 
     word: str
     words: tuple[str, ...]

@@ -101,8 +101,7 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
 
 
 def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
-    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite where there is
-    none."""
+    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite without any."""
     speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
@@ -114,8 +113,7 @@ def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[
 def made_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
 ) -> Iterator[Made]:
-    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments
-    `keys`.
+    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with `keys`.
 
     gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
     speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}

@@ -120,8 +120,7 @@ def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
 
 
 def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
-    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; heights over one
-    floor."""
+    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; over one floor."""
     ends = np.cumsum([len(motion) for motion in motions])
     frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
     roots, rotations, feet = [], [], []

@@ -92,8 +92,7 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
 
 
 def without_drift(motion: Motion) -> tuple[Motion, float]:
-    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it
-    did.
+    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres and by how much it did.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
     rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
@@ -132,8 +131,7 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
-    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), with feet that stand
-    still.
+    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), feet standing still.
 
     standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
     corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet).
@@ -153,16 +151,14 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
-    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than good recordings of the motion's speed
-    show."""
+    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than in good recordings of that speed."""
     way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
     speed = way.mean() * motion.fps if len(way) else 0.0
     return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)
 
 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
-    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at the heights they
-    have."""
+    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at their own heights."""
     planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
                     sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)

@@ -35,8 +35,7 @@ def find_clips(folder: str | Path) -> list[Path]:
 
 
 def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOREIGN)) -> list[Path]:
-    """All files below `folder` with one of these endings, as `find_clips`, converted or not; none where there are
-    none."""
+    """All files below `folder` with one of these endings, as `find_clips`, converted or not, or none."""
     folder = Path(folder)
     if not folder.is_dir():
         what = "no folder but a file" if folder.is_file() else "no such folder"

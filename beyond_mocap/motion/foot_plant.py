@@ -185,8 +185,7 @@ def turned_flat(foot: Foot, scale: float) -> Foot:
 def _goal(
     foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the
-    heel."""
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m, tilt (T,) radians of the heel."""
     ground, weight = held_shift(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
     rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt

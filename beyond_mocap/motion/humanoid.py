@@ -149,8 +149,7 @@ def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[
 
 
 def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
-    """Roles found by structure, or those that names tell where it found none, or took what is named an arm for a
-    leg."""
+    """Roles found by structure, or those that names tell where it found none, or took a named arm for a leg."""
     arms = {joint for role, joint in named.items() if role.endswith(("arm", "hand"))}
     return named if not found or arms & {found[role] for role in _LEG_ROLES} else found
 

@@ -25,8 +25,7 @@ CLEAR_BEND = 0.06
 
 
 def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.ndarray, xp=np) -> np.ndarray:
-    """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then it only nears
-    it.
+    """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then nearing it.
 
     distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
     straight. xp: array module, numpy or jax.numpy.

@@ -68,8 +68,7 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (..., J, 3) and rotations (..., J, 4) from root positions (..., 3) and local rotations
-    (..., J, 4).
+    """World positions (..., J, 3) and rotations (..., J, 4) from roots (..., 3) and local rotations (..., J, 4).
 
     Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
     """
@@ -178,8 +177,7 @@ def resample(motion: Motion, fps: float) -> Motion:
 
 
 def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
-    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, then moved by `offset`
-    metres."""
+    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, moved by `offset` metres."""
     turn = quaternion.about_up(np.broadcast_to(angle, (len(motion),)))
     rotations = motion.rotations.copy()
     rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])

@@ -68,8 +68,7 @@ class Strides:
 
 
 def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
-    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None with less than two
-    steps."""
+    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None below two steps."""
     sides, frames = _landings(standing, motion.fps)
     edges = np.flatnonzero(np.diff(sides) == 0) + 1
     first, last = max(zip([0, *edges], [*edges, len(sides)]), key=lambda run: run[1] - run[0])
@@ -136,8 +135,7 @@ def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
 
 def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
     """A recording at `phase` (T,) steps: pose (T, J, 4) relative to facing, height (T,), sway (T, 2) in the facing
-    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)
-    steps."""
+    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)."""
     curve = PchipInterpolator(np.arange(steps + 1.0), one.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
     root, pose = at_frames(one.motion, frames)

@@ -1,5 +1,4 @@
-"""A critically damped follower of third order: what is off its goal fades, from any place, speed and acceleration,
-smoothly.
+"""A critically damped follower of third order: what is off its goal fades smoothly from any place, speed, acceleration.
 
 Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and
 the acceleration is continuous wherever the goal changes.

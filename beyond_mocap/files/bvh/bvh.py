@@ -254,8 +254,7 @@ def to_ours(vectors: np.ndarray, up: str) -> np.ndarray:
 
 
 def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> np.ndarray:
-    """A joint's rotations in our axes, components first (4, T), from `columns`: axis letters and columns of `values`
-    (T, C).
+    """A joint's rotations in our axes, components first (4, T), from `columns`: letters and columns of `values` (T, C).
 
     Intrinsic, in the channels' order, degrees (Faustino §4.2.1 eq. 30-31). The turns are multiplied in closed form:
     each has two components only.

@@ -89,8 +89,7 @@ def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     """Angles (T, 3) in degrees of rotations (T, 4) in the order of `letters`, completed to a permutation of XYZ.
 
     Three letters: the middle angle within +-90 degrees. Fewer: of the two triples that make a rotation, (a, b, c) and
-    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero, so that these can be left
-    out.
+    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero and can be left out.
     """
     order = letters + "".join(axis for axis in "ZXY" if axis not in letters)
     angles = np.degrees(quaternion.to_euler(rotations, order))

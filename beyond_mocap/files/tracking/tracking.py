@@ -44,8 +44,7 @@ _ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams",
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
-    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, other columns ignored, as the file
-    has it.
+    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, others ignored, as the file has it.
 
     Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
     `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
@@ -90,8 +89,7 @@ def read_match(
     `providers.PROVIDERS`; where None, guessed from the content. cache_dir: where arrays are kept, keyed by the content
     of all files; by default the user's cache folder. pitch: length and width in metres for feeds that have none
     (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes, and all that was put
-    right in its report. InputError where files are missing, not of that form or not of one match, and where kloppy is
-    not installed.
+    right in its report. InputError where files are missing, not of that form or not of one match, and without kloppy.
     """
     feed, notes = find_feed(path, meta, provider)
     cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"

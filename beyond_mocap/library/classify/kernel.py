@@ -76,8 +76,7 @@ def weigh_silence(found: int, shown: int) -> float:
 
 
 def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, ruled: bool) -> np.ndarray:
-    """(3,) weights from candidates that the scores had not seen: score (N,), rule (N,), whether each is the act
-    (N,)."""
+    """(3,) weights from candidates that the scores had not seen: score, rule, whether each is the act (N,)."""
     from scipy.optimize import minimize
 
     start = np.array(PRIOR[ruled])

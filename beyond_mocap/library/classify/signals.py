@@ -137,8 +137,7 @@ def windows(signals: Signals) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """Windows reduced to their principal components. mean, scale (LENGTH,): of each number; basis (LENGTH,
-    K)."""
+    """Windows reduced to their principal components. mean, scale (LENGTH,): of each; basis (LENGTH, K)."""
 
     mean: np.ndarray
     scale: np.ndarray

@@ -181,8 +181,7 @@ def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
 
 
 def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple[np.ndarray, ...]:
-    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that had not seen their
-    clips."""
+    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that never saw their clips."""
     names = list(dict.fromkeys(side.example.name for side in sides))
     parts: list[tuple[np.ndarray, ...]] = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
     for fold in range(min(_FOLDS, len(names))):

@@ -29,8 +29,7 @@ class Path:
     closed: bool = False
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... how they change with the
-        parameter."""
+        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... their change with it."""
         raise NotImplementedError
 
     def _inside(self, u: np.ndarray) -> np.ndarray:
@@ -70,8 +69,7 @@ class SplinePath(Path):
     """A B-spline.
 
     knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3
-    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` control points repeat the
-    first.
+    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` points repeat the first.
     """
 
     knots: np.ndarray

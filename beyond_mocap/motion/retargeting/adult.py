@@ -1,5 +1,4 @@
-"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging in the rest
-pose.
+"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging at rest.
 
 Segment lengths are shares of the stature H after Drillis and Contini 1966 as printed in Winter 2009 ("Biomechanics and
 motor control of human movement", fig. 4.1): thigh .245 H, shank .246 H, ankle .039 H, upper arm .186 H, forearm .146 H,

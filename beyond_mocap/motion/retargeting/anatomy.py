@@ -61,8 +61,7 @@ class Anatomy:
 
 
 def spine_shares(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
-    """How far along the trunk each joint of `body.spine` turns: (S,), the pelvis at 0, the chest at 1, by arc
-    length."""
+    """How far along the trunk each joint of `body.spine` turns: (S,), pelvis 0, chest 1, by arc length."""
     if not body.spine:
         return np.zeros(0)
     top = next((joint for joint in (body.neck, body.head) if joint is not None), None)
@@ -215,8 +214,7 @@ class _Study:
             self.settle(limb.hand, -fingers, self.mean(limb.hand, self.direction(limb.lower_arm, 1)))
 
     def _collar(self, limb: Limb) -> None:
-        """A collar bone is as it is held on the mean; sideways where that is no way to hold it (folded-up rest
-        poses)."""
+        """A collar bone is as it is held on the mean; sideways where that cannot be (folded-up rest poses)."""
         self.follow(limb.shoulder, self.segment(self.body.chest))
         neutral = quaternion.inverse(self.axes[limb.shoulder])
         held = unit_vectors(quaternion.rotate(neutral, self._bone(limb.shoulder, limb.upper_arm)), _UP)
@@ -237,8 +235,7 @@ class _Study:
         self.settle(limb.lower_leg, -self._bone(limb.lower_leg, limb.foot), self.mean(limb.lower_leg, hinge + beside))
 
     def _bone(self, joint: int, child: int) -> np.ndarray:
-        """From `joint` to a joint below it, in the first one's axes, metres: (3,); on the mean where others lie
-        between."""
+        """From `joint` to a joint below it, in the first one's axes, metres: (3,); on the mean over joints between."""
         if self.skeleton.parents[child] == joint:
             return self.skeleton.offsets[child]
         return self.mean(joint, self.places[:, child] - self.places[:, joint])
@@ -314,8 +311,7 @@ def _tip(skeleton: Skeleton, joint: int) -> np.ndarray | None:
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> np.ndarray | None:
-    """Where the hand's fingers begin, on the mean, in its axes; its tip where it has none; None where nothing is
-    known."""
+    """Where the hand's fingers begin, on the mean, in its axes; its tip where it has none; None without either."""
     offsets = skeleton.offsets[list(skeleton.children(hand))].reshape(-1, 3)
     mean = offsets.mean(axis=0) if len(offsets) else np.zeros(3)
     return mean if np.linalg.norm(mean) > 1e-3 else _tip(skeleton, hand)

@@ -347,8 +347,7 @@ def _roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
 
 
 def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int]):
-    """Both bodies' roles with the map's pairs put through: a mapped joint has the role of the one that it is mapped
-    to."""
+    """Both bodies' roles with the map's pairs put through: a mapped joint takes its partner's role."""
     back = {joint: role for role, joint in target.items()}
     source, target = dict(source), dict(target)
     for mine, its in links.items():

@@ -97,8 +97,7 @@ def _legs_and_arms(parents, pairs):
 
 
 def _sided(legs, places, tips, parents, arms):
-    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as they
-    stand."""
+    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as is."""
     a, b = legs
     hips = 0.5 * (places[:, a[0]] + places[:, b[0]])
     ends = [arm[0] for arm in arms] if arms is not None else [0]
@@ -120,8 +119,7 @@ def _toe(parents, lengths, foot: int) -> int | None:
 
 
 def neck_and_head(parents, chest: int, taken: set[int], roles: Mapping[str, int]) -> dict[str, int]:
-    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has is
-    kept."""
+    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has stays."""
     if "neck" in roles:
         chain = _straight(parents, roles["neck"])
     else:

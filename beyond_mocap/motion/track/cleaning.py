@@ -35,8 +35,7 @@ _LONGEST_GAP = 3600.0
 class DataReport:
     """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
     rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,
-    end) seconds between measured samples. ball_unknown: samples without a ball. warnings: those lines that ask for
-    attention."""
+    end) seconds between measured samples. ball_unknown: samples without it. warnings: lines that ask for attention."""
 
     lines: tuple[str, ...]
     rate: float
@@ -131,8 +130,7 @@ def _with_missing_rows(times, positions, ball, name: str):
 
 
 def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """(N,) bool samples not to be believed, and the times of steps too large to be repaired; all positions are
-    numbers."""
+    """(N,) bool samples not to be believed, and times of steps too large to repair; all positions are numbers."""
     wrong = _spikes(times, positions)
     left = np.flatnonzero(~wrong)
     jumps, excess = _jumps(times[left], positions[left])
@@ -213,8 +211,7 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
 
 def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
     """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on
-    back while they lie on an exact line. The first sample of such a line is where the player was last seen, and is
-    kept.
+    back while they lie on an exact line. The first of such a line is where the player was last seen, and is kept.
     """
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
@@ -243,8 +240,7 @@ def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> n
 
 
 def _end_state(times, positions, believed, index: int, direction: int):
-    """(time, position, velocity) of the believed sample `index`, velocity over the believed samples beside it; or
-    None."""
+    """(time, position, velocity) of the believed sample `index`, velocity over the believed ones beside it; or None."""
     if not 0 <= index < len(times):
         return None
     members = [index]
@@ -260,8 +256,7 @@ def _end_state(times, positions, believed, index: int, direction: int):
 
 
 def _cubic(at: np.ndarray, before, after) -> np.ndarray:
-    """(len(at), 2): Hermite cubic from one end state to the other; beyond the track's ends, a velocity that dies
-    away."""
+    """(len(at), 2): Hermite cubic from one end state to the other; beyond the ends, a velocity that dies away."""
     if before is None or after is None:
         time, place, velocity = before or after
         away = at - time

@@ -1,5 +1,4 @@
-"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along at a steady rate of
-samples.
+"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along in even samples.
 
 Between two points the speed changes evenly with time, as under a steady pull: its square changes evenly along the way,
 which lets a player start from a stand and come to one. A point with speed 0 is a stop.

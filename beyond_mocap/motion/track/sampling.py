@@ -30,8 +30,7 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
 
     window: seconds of `smoothed`.
     The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
-    radius, which is also its height where the feed has none. InputError where there are fewer than two measured
-    samples.
+    radius, which is also its height where the feed has none. InputError below two measured samples.
     """
     times, fine, step = _grids(track, fps)
     positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
@@ -102,8 +101,7 @@ def _pause(moving: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndar
 
 
 def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many values), and its steps per
-    frame."""
+    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many), and its steps per frame."""
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):
