@@ -86,7 +86,7 @@ def add_learning_options(verb) -> None:
 def run_learning(options, told: Told) -> None:
     """Learns, proposes, or first the one and then the other. InputError for clips that cannot be read, and for a table
     of words that would be lost."""
-    from ..library.classify import keep
+    from ..library.classify import classifier
     from ..library.classify.examples import examples_of
     from ..library.classify.train import trained
     from ..library.scan import TABLE_NAME
@@ -99,12 +99,12 @@ def run_learning(options, told: Told) -> None:
     if options.propose and options.propose.name == TABLE_NAME and options.propose.exists():
         what = "holds words already, which would be lost"
         raise InputError(options.propose, what, "a new file", "choose another name, then put the rows together")
-    known = keep.read(options.learned) if options.learned else None
+    known = classifier.read_classifier(options.learned) if options.learned else None
     if options.learn:
         examples = examples_of(options.library, options.unit, told.progress, cache_dir=options.cache,
                                cancelled=told.cancelled, note=told.note)
         known = trained(examples, told.progress, told.cancelled)
-        keep.write(options.learn, known)
+        classifier.write_classifier(options.learn, known)
         told.end()
         for line in known.told():
             print(line)

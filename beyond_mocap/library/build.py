@@ -98,7 +98,7 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
 
 def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
     """Each file as read, without pops (and their number), and without drift (and its metres); some at once. files: what
-    to read for each of `paths` (`converted`); the unit is that of the user's own files."""
+    to read for each of `paths` (`scan.Conversions`); the unit is that of the user's own files."""
 
     def read_one(path: Path, file: Path):
         source = bvh.read(file, unit if file == path else None)

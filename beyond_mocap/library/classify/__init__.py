@@ -4,7 +4,7 @@
 - `examples`     what people have said about a few clips
 - `kernel`       how much a window looks like an act, and how sure that makes, beside what the rules say
 - `details`      the words beside an act: side, height, surface
-- `classifier`   what is known of each act, and of all; `train` learns it, `keep` writes and reads it
+- `classifier`   what is known of each act, and of all, and its file; `train` learns it
 
     known = trained(examples_of("library"))
     for one in propose(motion, gaits, known):          # of `library.proposals`

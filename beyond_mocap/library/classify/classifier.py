@@ -1,22 +1,29 @@
 """A classifier of acts: what it knows of each (how it looks, how sure that makes, where its moment lies, which words go
-with it), and what it proposes for a recording beside what the rules do."""
+with it), what it proposes for a recording beside what the rules do, and its file: one `.npz` of plain arrays and a
+header in JSON, never pickled, checked when it is read."""
 
 from __future__ import annotations
 
+import io
+import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
+from ...base.errors import InputError
 from ...base.runs import runs
+from ...files.whole import atomic_write
 from ...motion.motion import Motion
 from ..word_sources import LEARNED, Proposal
 from .details import Details
 from .kernel import Kernel, compute_confidence
-from .signals import RATE, STRIKES, Signals, Space, signals, windows
+from .signals import LENGTH, RATE, STRIKES, Signals, Space, signals, windows
 
 LEAST = 0.2
 """Moments that are less sure than this are not proposed at all."""
@@ -28,6 +35,13 @@ _CANDIDATES_APART = 10  # samples between two candidates
 _STEADY = 9  # samples over which a stretch's score is averaged
 _NOTHING = 0.01  # seconds: leads that are shorter are how somebody sets keys
 _AROUND = 0.12  # seconds around a candidate in which its strike is looked for
+
+_FILE_VERSION = 1
+FILE_NAME = "learned_words.npz"
+"""The file's name beside a library's cache."""
+
+_LARGEST = 256 * 1024 * 1024
+_NEXT = "learn from annotated clips again"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -214,3 +228,102 @@ def _surest(found: list[Proposal], fps: float) -> list[Proposal]:
         if all(abs(one.annotation.key - other.annotation.key) > _APART * fps for other in kept):
             kept.append(one)
     return kept
+
+
+def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
+    """Writes a classifier whole; InputError where it cannot be written."""
+    arrays = {"mean": known.space.mean, "scale": known.space.scale, "basis": known.space.basis}
+    for number, act in enumerate(known.acts):
+        arrays[f"{number}.supports"], arrays[f"{number}.weights"] = act.kernel.supports, act.kernel.weights
+        arrays[f"{number}.sure"] = act.weights
+        for group, plane in enumerate(act.details.planes):
+            arrays[f"{number}.plane.{group}"] = plane
+    header = {"version": _FILE_VERSION, "clips": known.clips, "acts": [_describe_act(act) for act in known.acts]}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    out = io.BytesIO()
+    np.savez_compressed(out, **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def read_classifier(path: str | os.PathLike) -> Classifier:
+    """The classifier in a file; InputError where it is missing, damaged, or of another version."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(path, "more than 256 MiB", "a file of learned words", _NEXT)
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        header = json.loads(arrays["header"].tobytes())
+        version = header["version"]
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "a file of learned words", _NEXT) from None
+    except Exception:  # a damaged file can fail in any of zipfile's, numpy's and json's own ways
+        raise InputError(path, "a file that cannot be read", "a file of learned words", _NEXT) from None
+    if version != _FILE_VERSION:
+        raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT)
+    try:
+        return _restore_classifier(header, arrays)
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
+        raise InputError(path, "numbers that do not belong together", "a file of learned words", _NEXT) from None
+
+
+def _describe_act(act: Act) -> dict:
+    return {
+        "word": act.word, "moment": act.moment, "shift": act.kernel.shift, "gamma": act.kernel.gamma,
+        "silent": act.silent, "shown": act.shown, "strike": act.strike, "lead": act.lead,
+        "before": act.before, "after": act.after,
+        "choices": act.details.choices, "by_rule": act.details.by_rule,
+    }
+
+
+def _restore_classifier(header: dict, arrays: dict) -> Classifier:
+    """ValueError where a shape or number is out of order."""
+    components = arrays["basis"].shape[1]
+    mean, scale = _check_array(arrays, "mean", (LENGTH,)), _check_array(arrays, "scale", (LENGTH,))
+    space = Space(mean, scale, _check_array(arrays, "basis", (LENGTH, components)))
+    if np.any(scale <= 0.0) or not header["acts"]:
+        raise ValueError("scale")
+    acts = tuple(_restore_act(number, one, arrays, components) for number, one in enumerate(header["acts"]))
+    return Classifier(space, acts, int(header["clips"]))
+
+
+def _restore_act(number: int, header: dict, arrays: dict, components: int) -> Act:
+    count = len(arrays[f"{number}.weights"])
+    if not count or not _check_word(header["word"]):
+        raise ValueError("act")
+    supports = _check_array(arrays, f"{number}.supports", (count, components))
+    kernel = Kernel(supports, _check_array(arrays, f"{number}.weights", (count,)), _check_number(header["shift"]),
+                    _check_number(header["gamma"], least=0.0))
+    choices = tuple(tuple(_check_word(word) for word in group) for group in header["choices"])
+    planes = tuple(_check_array(arrays, f"{number}.plane.{group}", (len(words), components + 1))
+                   for group, words in enumerate(choices))
+    by_rule = tuple(bool(one) for one in header["by_rule"])
+    strike = int(header["strike"])
+    if len(by_rule) != len(choices) or not -1 <= strike < len(STRIKES) or not all(choices):
+        raise ValueError("header")
+    before, after = (_check_number(header[name], least=0.0) for name in ("before", "after"))
+    return Act(word=_check_word(header["word"]), moment=bool(header["moment"]), kernel=kernel,
+               weights=_check_array(arrays, f"{number}.sure", (3,)), silent=_check_number(header["silent"]),
+               shown=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]), before=before,
+               after=after, details=Details(choices, planes, by_rule))
+
+
+def _check_array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    found = arrays[name]
+    if found.shape != shape or found.dtype.kind != "f" or not np.all(np.isfinite(found)):
+        raise ValueError(name)
+    return found
+
+
+def _check_number(value, least: float = -1e6) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value < 1e6:
+        raise ValueError("number")
+    return float(value)
+
+
+def _check_word(value) -> str:
+    if not isinstance(value, str) or any(not (letter.isalnum() or letter in "_-") for letter in value):
+        raise ValueError("word")
+    return value

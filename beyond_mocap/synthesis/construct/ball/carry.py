@@ -69,7 +69,7 @@ def arm(limb: Limb) -> tuple[int, int, int]:
 @dataclass(frozen=True, eq=False)
 class Resting:
     """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft`
-    as for `reach.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
+    as for `limb.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
 
     chain: tuple[int, int, int]
     soft: float
