@@ -101,14 +101,9 @@ def _foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
     """From the ankle to the toe joint, or to the foot's end site where the skeleton has no toe joint."""
     if limb.toe is not None:
         return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.toe, _HERE))
-    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, _tip(skeleton, limb.foot)))
+    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, skeleton.tip(limb.foot)))
 
 
 def _head(skeleton: Skeleton, body: Humanoid) -> Surface:
-    middle = (body.head, 0.5 * _tip(skeleton, body.head))
+    middle = (body.head, 0.5 * skeleton.tip(body.head))
     return Surface("head", "", HEAD_RADIUS, middle, middle)
-
-
-def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
-    """From a joint to its first end site (3,) m in the joint's frame; zero where it has none."""
-    return next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == joint), _HERE)

@@ -191,9 +191,8 @@ def _balls(motion: Motion) -> np.ndarray:
     balls = []
     for limb in (body.left, body.right):
         ball = places[:, limb.toe_or_foot]
-        if limb.toe is None and limb.foot in skeleton.end_parents:
-            tip = skeleton.end_offsets[skeleton.end_parents.index(limb.foot)]
-            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * tip)
+        if limb.toe is None:
+            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * skeleton.tip(limb.foot))
         balls.append(ball)
     return np.stack(balls, axis=1)
 

@@ -177,9 +177,9 @@ def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[st
     if chest is not None:
         roles.update({**structure.neck_and_head(parents, chest, set(roles.values()), roles), **roles})
     top = roles.get("neck", roles.get("head"))
-    spine = _chain(parents, roles["hips"], top) if top is not None else []
+    spine = structure.list_between(parents, roles["hips"], top) if top is not None else []
     if not spine and chest is not None and chest != roles["hips"]:
-        spine = [*_chain(parents, roles["hips"], chest), chest]
+        spine = [*structure.list_between(parents, roles["hips"], chest), chest]
     limbs = {side: Limb(**{part: roles.get(f"{side} {part}") for part in _LIMB_NAMES}) for side in ("left", "right")}
     mirror = _mirror([side_and_part(name) for name in names], parents, roles)
     neck, head = roles.get("neck"), roles.get("head")
@@ -224,15 +224,6 @@ def _limb(parts, side: str) -> dict[str, int | None]:
 def _centre(parts, part: str) -> int | None:
     places = {rest: i for i, (s, rest) in reversed(list(enumerate(parts))) if not s}
     return next((places[o] for o in _CENTRE_NAMES[part] if o in places), None)
-
-
-def _chain(parents, low: int, high: int) -> list[int]:
-    """Joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
-    chain, joint = [], parents[high]
-    while joint >= 0 and joint != low:
-        chain.append(joint)
-        joint = parents[joint]
-    return chain[::-1] if joint == low else []
 
 
 def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:

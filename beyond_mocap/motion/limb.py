@@ -17,7 +17,7 @@ from ..base.errors import InputError
 from ..base.vectors import cross, unit_vectors
 from . import quaternion
 from .motion import pose_kinematics
-from .retargeting.structure import path
+from .retargeting.structure import list_between, path
 from .skeleton import Skeleton
 
 # below this distance from the line hip-ankle (share of the limb's length) a knee's direction is taken from other frames
@@ -144,7 +144,7 @@ def bent_limb(
         new_world[:, end] = end_rotation
     elif not keep_end_rotation:
         new_world[:, end] = quaternion.multiply(turns[1], world[:, end])
-    changed = [*_list_chain(skeleton, upper, end), end]
+    changed = [upper, *list_between(skeleton.parents, upper, end), end]
     local = {joint: _compute_local(skeleton, new_world, joint) for joint in changed}
     return local, np.linalg.norm(new_ankle - target, axis=-1)
 
@@ -168,14 +168,9 @@ def _check_chain(skeleton: Skeleton, joints: tuple[int, int, int]) -> None:
             raise InputError("limb", f"{skeleton.names[low]} does not hang below {skeleton.names[high]}", "a chain")
 
 
-def _list_chain(skeleton: Skeleton, high: int, low: int) -> list[int]:
-    """Joints from `high` (included) down to `low` (not included)."""
-    chain = path(skeleton.parents, low)
-    return chain[1 : chain.index(high) + 1][::-1]
-
-
 def _turn_chain(skeleton: Skeleton, world: np.ndarray, high: int, low: int, turn: np.ndarray) -> None:
-    for joint in _list_chain(skeleton, high, low):
+    """Turns all joints from `high` (included) down to `low` (not included) in `world` (T, J, 4)."""
+    for joint in (high, *list_between(skeleton.parents, high, low)):
         world[:, joint] = quaternion.multiply(turn, world[:, joint])
 
 

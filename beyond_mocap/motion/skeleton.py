@@ -61,6 +61,10 @@ class Skeleton:
         """Indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
 
+    def tip(self, joint: int) -> np.ndarray:
+        """From a joint to its first end site (3,) m, in the joint's own axes; zero where it has none."""
+        return next((o for p, o in zip(self.end_parents, self.end_offsets) if p == joint), np.zeros(3))
+
     def part(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
         """These joints and all above them as a skeleton without tips, and their indices in this one."""
         found: set[int] = set()

@@ -25,6 +25,7 @@ from .. import quaternion
 from ..humanoid import Humanoid, Limb
 from ..motion import Motion, pose_kinematics
 from ..skeleton import Skeleton, frozen_array
+from .structure import list_between
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
@@ -76,11 +77,7 @@ def head_chain(skeleton: Skeleton, body: Humanoid) -> tuple[int, ...]:
     """The joints from neck to head, from below; one or none where the body lacks them."""
     if body.head is None or body.neck is None:
         return tuple(joint for joint in (body.neck, body.head) if joint is not None)
-    chain, joint = [body.head], skeleton.parents[body.head]
-    while joint >= 0 and joint != body.neck:
-        chain.append(joint)
-        joint = skeleton.parents[joint]
-    return (body.neck, *chain[::-1]) if joint == body.neck else (body.neck, body.head)
+    return (body.neck, *list_between(skeleton.parents, body.neck, body.head), body.head)
 
 
 def study(
@@ -304,9 +301,7 @@ class _Study:
 
 def _tip(skeleton: Skeleton, joint: int) -> np.ndarray | None:
     """The joint's end site (3,) metres, None where it has none or one of no length."""
-    if joint not in skeleton.end_parents:
-        return None
-    offset = skeleton.end_offsets[skeleton.end_parents.index(joint)]
+    offset = skeleton.tip(joint)
     return offset if np.linalg.norm(offset) > 1e-3 else None
 
 

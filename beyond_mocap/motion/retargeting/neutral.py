@@ -164,18 +164,14 @@ def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: floa
 
 
 def _has_tip(skeleton: Skeleton, joint: int) -> bool:
-    return joint in skeleton.end_parents and bool(np.linalg.norm(_tip(skeleton, joint)) > 1e-4)
-
-
-def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
-    return skeleton.end_offsets[skeleton.end_parents.index(joint)]
+    return bool(np.linalg.norm(skeleton.tip(joint)) > 1e-4)
 
 
 def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None) -> np.ndarray:
     """World direction (3,) of the bone from `joint` to `child` (or to its tip, or its parent's bone going on)."""
     if child is not None:
         return unit_vectors(_world_offset(skeleton, world, joint, child), _DOWN)
-    offset = _tip(skeleton, joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
+    offset = skeleton.tip(joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
     return unit_vectors(quaternion.rotate(world[joint], offset), _DOWN)
 
 
@@ -211,11 +207,8 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
     ]
     leg = float(np.mean(legs))
     ball = np.array([_ball(places, limb, leg) for limb in limbs])
-    tips = [
-        np.linalg.norm(_tip(skeleton, limb.toe))
-        for limb in limbs
-        if limb.toe is not None and _has_tip(skeleton, limb.toe)
-    ]
+    toes = [limb.toe for limb in limbs if limb.toe is not None and _has_tip(skeleton, limb.toe)]
+    tips = [np.linalg.norm(skeleton.tip(toe)) for toe in toes]
     middle = 0.5 * (places[body.left.upper_leg] + places[body.right.upper_leg])
     ankle_height = float(np.mean(-ball[:, 2])) + _BALL_HEIGHT * leg
     ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height

@@ -167,6 +167,12 @@ def path(parents, joint: int) -> list[int]:
     return found
 
 
+def list_between(parents, low: int, high: int) -> list[int]:
+    """Joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
+    chain = path(parents, high)
+    return chain[1 : chain.index(low)][::-1] if low in chain else []
+
+
 def below(parents, joint: int) -> list[int]:
     """`joint` and everything that hangs on it."""
     found = {joint}
