@@ -32,8 +32,7 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
 
     fps: the clip's rate; times become its nearest frames. A key line belongs to the shortest span around it that names
     the same action, and lends it its words; a key line on its own has no extent. Spans may overlap; spans without words
-    or with `transition` say nothing about a clip and are left out.
-    """
+    or with `transition` say nothing about a clip and are left out."""
     return clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
 
 
@@ -53,8 +52,7 @@ def read_annotation_csv(
 
     Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
     without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row
-    that is not of this form.
-    """
+    that is not of this form."""
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}
     try:

@@ -73,8 +73,7 @@ class EventWords:
 
         kind: of KINDS. part: of BODY_PARTS, "" where unknown. details: what else is known. filled_in: what stands for
         the names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
-        counts before one that does not, then one that names a detail, then the first.
-        """
+        counts before one that does not, then one that names a detail, then the first."""
         fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
         fitting = [row for row in fitting if not row.detail or row.detail in details]
         if not fitting:
@@ -89,8 +88,7 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
     """The table in a CSV file of kind,part,detail,words; None: the one that comes with us.
 
     known_words: beyond the vocabulary. Lines that begin with # are comments. InputError, with the line, for kinds,
-    parts or words that are not known, and rows that say the same twice.
-    """
+    parts or words that are not known, and rows that say the same twice."""
     path = TABLE if path is None else path
     known, rows, seen = vocabulary_words(known_words), [], {}
     lines = read_text(path).splitlines()

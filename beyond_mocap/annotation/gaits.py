@@ -40,8 +40,7 @@ def gait_thresholds(speeds: np.ndarray, omega: float = 4.0) -> np.ndarray:
 
     Faustino §3.1.1 prints s_A + (s_A - s_B) / omega, which lies below the slower gait's own speed; the sign is turned
     here so that omega = 4 puts the threshold a quarter of the way up, as the text explains ("to limit the usage of
-    slower locomotion mocaps on higher movement speed"). The step up from standing is never below STANDING_SPEED.
-    """
+    slower locomotion mocaps on higher movement speed"). The step up from standing is never below STANDING_SPEED."""
     speeds = np.asarray(speeds, dtype=float)
     if speeds.ndim != 1 or not np.all(np.isfinite(speeds)) or np.any(np.diff(speeds) <= 0):
         raise InputError("gait speeds", f"{speeds.tolist()}", "ascending speeds in m/s, one per gait")
@@ -60,8 +59,7 @@ def recorded_thresholds(speeds: np.ndarray, speed: np.ndarray, gait: np.ndarray)
     speeds (G,) m/s, ascending, the gaits' averages; speed (N,) m/s and gait (N,) index of annotated frames. Between
     gaits that do not overlap it is half way; the step up from standing is STANDING_SPEED, since a body that stands
     cannot travel. Faustino's omega asks for the faster gait already a quarter of the way up, which no recording of that
-    speed is then called.
-    """
+    speed is then called."""
     found = []
     for slow, (low, high) in enumerate(zip(speeds, speeds[1:])):
         below, above = np.sort(speed[gait == slow]), np.sort(speed[gait == slow + 1])
@@ -82,8 +80,7 @@ def automatic_gaits(
     thresholds: (G-1,) m/s (`gait_thresholds`, `recorded_thresholds`).
     hysteresis: how far beyond a threshold the speed must go to change gait, as a share of the distance between the two
     gaits, at most a quarter of the threshold (the paper has none: at a boundary speed its annotation flickers with the
-    noise). minimum: seconds a gait lasts at least; shorter ones go to the nearer neighbour, then the longer.
-    """
+    noise). minimum: seconds a gait lasts at least; shorter ones go to the nearer neighbour, then the longer."""
     speed = np.asarray(speed, dtype=float)
     margins = np.minimum(hysteresis * np.diff(np.asarray(speeds, dtype=float)), thresholds / 4.0)
     steps = [_trigger(speed, threshold, margin) for threshold, margin in zip(thresholds, margins)]
@@ -95,8 +92,7 @@ def wanted_offset(track: SampledTrack) -> np.ndarray:
     """(T,) radians from the direction of travel to where the body should face, counterclockwise, in -pi .. pi.
 
     The ball's direction, as far as legs can turn aside at that speed: all the way round below 0.8 m/s, not at all at 6.
-    Zero where the ball is unknown; at their own feet players follow it along their way.
-    """
+    Zero where the ball is unknown; at their own feet players follow it along their way."""
     away = track.ball[:, :2] - track.positions
     known = np.isfinite(away).all(axis=1)
     distance = np.linalg.norm(np.where(known[:, None], away, 1.0), axis=1)

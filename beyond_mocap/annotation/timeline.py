@@ -102,8 +102,7 @@ class Timeline:
 def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
     """Per time of `times` (T,) seconds: the words in force, None in a transition, empty where locomotion is automatic.
 
-    A span holds from its start up to, not including, its end; one that ends with the last time holds there too.
-    """
+    A span holds from its start up to, not including, its end; one that ends with the last time holds there too."""
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str] | None] = [frozenset()] * len(times)
     for span in timeline.spans:
@@ -140,8 +139,7 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
 
     times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words
     and key moments stay as they are; the others are replaced by one span per stretch of equal automatic words. A
-    stretch runs from its first frame to the next stretch's; the last ends at the last frame.
-    """
+    stretch runs from its first frame to the next stretch's; the last ends at the last frame."""
     times = np.asarray(times, dtype=float)
     if not len(times):
         return timeline
@@ -176,8 +174,7 @@ def problems(
     """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown.
 
     known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time
-    in seconds, None where there is no track to compare with. where: the file, for messages.
-    """
+    in seconds, None where there is no track to compare with. where: the file, for messages."""
     known = vocabulary_words(known_words)
     found: list[InputError] = []
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
@@ -203,8 +200,7 @@ def missing_keys(
     """The key moments that no choice serves, each with the `count` nearest choices.
 
     choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when
-    it carries all of its words; further words do no harm.
-    """
+    it carries all of its words; further words do no harm."""
     held = [tuple(choice) for choice in choices]
     lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
     return [(key, nearest(key.words, held, count)) for key in lacking]

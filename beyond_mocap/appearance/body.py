@@ -76,8 +76,7 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
     """Vertices (..., V, 3), metres, of the body with joints at `places` (..., J, 3), turned by `world` (..., J, 4).
 
-    Linear blend skinning, as Blender's armature modifier does without volume preservation.
-    """
+    Linear blend skinning, as Blender's armature modifier does without volume preservation."""
     origin = skeleton.rest_positions
     out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
     for column in range(2):

@@ -53,8 +53,7 @@ def _camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
     """The shadow of faces that look at the sun, then the faces that look at the camera, the far ones first.
 
-    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows.
-    """
+    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows."""
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = unit_vectors(normal, least=1e-12)

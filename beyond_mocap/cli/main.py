@@ -62,8 +62,7 @@ def main(
     """Runs one command and returns its exit status.
 
     writers: by suffix, further kinds of `--out` (Blender's). apart: runs a command line in a process of its own, where
-    this one cannot send work to others, as within Blender.
-    """
+    this one cannot send work to others, as within Blender."""
     told = None
     _escape(sys.stdout)
     try:

@@ -27,8 +27,7 @@ class MatchEvent:
     time: s from the begin of its period, on the events' own clock. period: 1 for the first. player: the tracking's id,
     "" where he is not known. team: "home", "away" or "". kind: of `annotation.event_words.KINDS`. part: "foot",
     "head", "chest", "hand" or "". side: "left", "right" or "". details: further words ("throw-in", "lost"). said: how
-    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, or NaN.
-    """
+    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, or NaN."""
 
     time: float
     period: int
@@ -84,8 +83,7 @@ class Who:
 def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Who, tuple[str, str]], list[str]]:
     """Who -> (id, team) in the match, of those who are found, and notes.
 
-    Feeds may call the other team home: the way round in which more are found counts.
-    """
+    Feeds may call the other team home: the way round in which more are found counts."""
     if match is None:
         return {}, []
     players = [player for player in match.players if player.team != REFEREE]

@@ -50,8 +50,7 @@ def read_events(
     of Metrica and Sportec, Stats Perform's MA1); where None, one beside `path` whose name fits. provider: one of
     `event_providers.EVENT_PROVIDERS`; where None, guessed from the content. match: whose ids the players get and on
     whose pitch the places are; without one they keep their own. InputError where files are missing or not of that form,
-    and where most players are not in the match: the events are of another one.
-    """
+    and where most players are not in the match: the events are of another one."""
     if not Path(path).is_file():
         found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a file of events", "check the path")

@@ -21,8 +21,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
     """vertices (V, 3) m, Z up, and triangles (F, 3), indices of them; faces of more corners are split into fans.
 
     InputError, with the line, where a number is none, a face names a vertex that is not there or has fewer than three
-    corners; where there are no faces.
-    """
+    corners; where there are no faces."""
     vertices, triangles = [], []
     for place, words in _lines(path):
         if words[0] == "v":

@@ -30,8 +30,7 @@ def plain_arrays(
 
     kind: what the file should be, for messages. types: of numbers that it may hold. unpacked: bytes of all its arrays
     together above which it is no such file. others: what a file is instead that has an array of such a name and no
-    text. InputError where it is no zip of such arrays.
-    """
+    text. InputError where it is no zip of such arrays."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()

@@ -88,8 +88,7 @@ def read_rows(
     others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
     counts; with others than a comma, a comma in a number is its decimal point, as in many countries.
 
-    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
-    """
+    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells."""
     text = _text(path)
     separator = next((one for one in separators if not _missing(_header(text, one, others), required)), ",")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)

@@ -42,8 +42,7 @@ def with_chosen_gaits(library: Library, chosen: Mapping[str, str]) -> Library:
     alone say how fast the gait is, and no other clip's locomotion carries it. Actions of other clips keep their words.
 
     InputError for a word that is no gait, a clip that the library has not, one whose rows do not carry the word, and
-    for clips that are not slower than the next faster gait's.
-    """
+    for clips that are not slower than the next faster gait's."""
     if not chosen:
         return library
     for word, path in chosen.items():

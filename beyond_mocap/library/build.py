@@ -33,8 +33,7 @@ def build(
     unit (default: guessed per file). seed: of the clustering. threads: how many files are read at once, which
     changes no bit of what comes out.
     Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
-    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled.
-    """
+    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled."""
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
     place, where = cache.place(folder, cache_dir)

@@ -65,8 +65,7 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
 def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
 
-    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
-    """
+    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ."""
     from sklearn.cluster import KMeans
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits

@@ -36,8 +36,7 @@ class Frames:
     (x forward, y left). feet (N, 4) m: where the left and the right toe (ankle where there is none) lie on the ground,
     from the path, in the facing frame. jerk (N,) m/s^3 of the joint that has most, from the third difference around
     each frame. features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words
-    (N, V) bool, one column per word of `vocabulary`.
-    """
+    (N, V) bool, one column per word of `vocabulary`."""
 
     clip: np.ndarray
     source: np.ndarray
@@ -85,8 +84,7 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
     """One clip's features before PCA: joint positions (T, K, 3) m with the root first, heading (T,) -> (T, 9 K - 2).
 
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
-    by the root of K, so that a distance is the root mean square over joints.
-    """
+    by the root of K, so that a distance is the root mean square over joints."""
     velocity = time_derivative(positions, fps)
     acceleration = time_derivative(velocity, fps)
     relative = positions.copy()

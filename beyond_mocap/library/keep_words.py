@@ -94,8 +94,7 @@ def keep(
 ) -> Path:
     """Write a clip's rows where they belong (`place`); returns the file. sources: who said those that no person did.
 
-    InputError where words that differ are there and `overwrite` is not set, or where the file cannot be written.
-    """
+    InputError where words that differ are there and `overwrite` is not set, or where the file cannot be written."""
     form, target = place(clip, folder)
     if has_words(clip, folder, fps) and not overwrite:
         what = "has other words for this clip already"
@@ -163,8 +162,7 @@ def add_clip(
     """Writes NAME.bvh into a library's folder and, where there are words, NAME.txt; returns lines for people.
 
     words: of the annotation; with key_seconds, from the motion's first frame, they name that moment, else the whole
-    motion. Nothing that is there is replaced. InputError where it cannot be written, for no word, or a key outside.
-    """
+    motion. Nothing that is there is replaced. InputError where it cannot be written, for no word, or a key outside."""
     clip, words = free_place(folder, name), plain_words(words)
     key = None if key_seconds is None else round(key_seconds * motion.fps)
     if key is not None and not 0 <= key < len(motion):

@@ -181,8 +181,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
 
     A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
     nor do made clips of a gait that is recorded, nor other clips than the chosen one, nor rows that a slower one would
-    overtake in the mean (then the word is dropped, since thresholds need an order).
-    """
+    overtake in the mean (then the word is dropped, since thresholds need an order)."""
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames

@@ -32,8 +32,7 @@ def bring(
     motions: as read, in the order of `paths`; chosen: a recording whose skeleton is to be the library's (default: the
     skeleton with most frames, the first path's among equals). `notes` gets one line about what was brought over.
     Heels and toes stand where the recording's own do; where only the new body has toes they are looked for on it.
-    Raises InputError, naming the file, for a clip whose legs cannot be found.
-    """
+    Raises InputError, naming the file, for a clip whose legs cannot be found."""
     standing = [_named(path, lambda: contacts.points(motion)) for path, motion in zip(paths, motions)]
     groups = _groups(motions)
     skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
@@ -57,8 +56,7 @@ def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | P
     floor.
 
     bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as
-    there.
-    """
+    there."""
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(
         motion, target.skeleton, bone_map, example=target,

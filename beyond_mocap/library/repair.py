@@ -52,8 +52,7 @@ class Repaired:
 
     standing (T, 2, 2): left and right, heel and toe, on the ground. drift: metres between the lowest and the highest
     floor. travel: metres by which the last frame was moved against the first. slide: m/s before and after, mean over
-    standing heels and toes. slid: whether it slid so much that way and feet were mended.
-    """
+    standing heels and toes. slid: whether it slid so much that way and feet were mended."""
 
     motion: Motion
     standing: np.ndarray
@@ -95,8 +94,7 @@ def without_drift(motion: Motion) -> tuple[Motion, float]:
     """The motion on a floor that neither rises nor sinks by more than _DRIFT metres and by how much it did.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
-    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
-    """
+    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand."""
     low = forward_kinematics(motion)[0][..., 2].min(axis=1)
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
     floor = np.zeros((len(low), 1))
@@ -135,8 +133,7 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
     standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
     corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet).
-    Bones and rate stay.
-    """
+    Bones and rate stay."""
     standing = contacts.points(motion) if standing is None else standing
     motion, drift = _levelled(motion, standing)
     before, travel = slide(motion, standing), 0.0
@@ -184,8 +181,7 @@ def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
 def _balls(motion: Motion) -> np.ndarray:
     """Where the balls of both feet are, (T, 2, 3) metres: toe joints, else on the way from ankle to the foot's tip.
 
-    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel.
-    """
+    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel."""
     skeleton, body = motion.skeleton, identify(motion.skeleton)
     places, world = forward_kinematics(motion)
     balls = []
@@ -217,8 +213,7 @@ def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
     """The motion whose pelvis goes where its standing feet say, and by how far its way is longer or shorter, metres.
 
     Only the middle of a stance tells: a foot that lands or leaves moves. On recordings without sliding the way comes
-    out as it was, to half a per cent.
-    """
+    out as it was, to half a per cent."""
     velocity = np.diff(_balls(motion)[..., :2], axis=0) * motion.fps
     weight = _inner(standing[..., 1])
     firm = np.minimum(weight[1:], weight[:-1])
@@ -242,8 +237,7 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     """The curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2, from pushed = w v (T, P), weights (T,
     P).
 
-    seconds: how slowly it can change; the stiffness is its fourth power.
-    """
+    seconds: how slowly it can change; the stiffness is its fourth power."""
     squares = BandedLeastSquares(len(pushed), reach=2)
     squares.add_value(weight.sum(axis=1) + pull)
     squares.add_difference(2, (seconds * fps) ** 4)

@@ -67,8 +67,7 @@ def own_recordings(folder: str | Path) -> list[Path]:
 def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
     """The recordings of a library that can be read now, their conversions, and a line about those that wait for theirs.
 
-    place: the library's cache. InputError where there is none that can be read.
-    """
+    place: the library's cache. InputError where there is none that can be read."""
     found, conversions = own_recordings(folder), Conversions(folder, place)
     waiting = conversions.waiting(found)
     late = set(waiting)
@@ -131,8 +130,7 @@ def is_foreign(path: Path) -> bool:
 class Conversions:
     """Which recordings below a library's folder have been converted, and where that is kept.
 
-    folder: the library's; place: its cache (`cache.place`).
-    """
+    folder: the library's; place: its cache (`cache.place`)."""
 
     def __init__(self, folder: str | Path, place: str | Path):
         """Reads the table; a damaged one counts as empty."""

@@ -59,8 +59,7 @@ def is_open(row: Mapping) -> bool:
 def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:
     """The sources of rows that were read from a text file; of a row with two lines the key moment's counts.
 
-    fps: the clip's rate. InputError where the file cannot be read.
-    """
+    fps: the clip's rate. InputError where the file cannot be read."""
     said = {}
     for line in read_text(path).splitlines():
         found = _COMMENT.search(line)

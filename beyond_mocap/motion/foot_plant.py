@@ -116,8 +116,7 @@ def plant(
     moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels:
     standing feet are
     brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
-    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
-    """
+    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth)."""
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
@@ -197,8 +196,7 @@ def _goal(
 def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     """(T,) least radians, at most MOST_RISE, by which a heel turns up about its toe so that the leg reaches its ankle.
 
-    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
-    """
+    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K."""
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
@@ -241,8 +239,7 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     velocity (T - 1, P, K) or, for one point, (T - 1, K): movement per frame of P points; weight (T, P): how firmly each
     point stands. Minimizes sum w |D' + v|^2 + SMOOTH |D'''|^2 + PULL |D|^2 with differences per frame at 30 frames per
     second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given,
-    rows of NaN where D is free.
-    """
+    rows of NaN where D is free."""
     count = len(weight)
     if velocity.ndim == 2:
         velocity = velocity[:, None, :]

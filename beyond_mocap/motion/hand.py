@@ -24,8 +24,7 @@ class Hand:
     side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
     finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
     frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
-    which the origin has in it.
-    """
+    which the origin has in it."""
 
     side: str
     fps: float
@@ -69,8 +68,7 @@ def hand_of(motion: Motion, side: str) -> Hand:
 def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
 
-    The skeleton's own tip where it has a likely one, else straight on from the forearm.
-    """
+    The skeleton's own tip where it has a likely one, else straight on from the forearm."""
     skeleton, hand = motion.skeleton, limb.hand
     forearm = float(np.linalg.norm(skeleton.offsets[hand]))
     usual = _HAND_OF_ARM * forearm

@@ -109,8 +109,7 @@ def side_and_part(name: str) -> tuple[str, str]:
 def identify(skeleton: Skeleton) -> Humanoid:
     """The meaning of a skeleton's joints, by names, else by the structure of its rest pose.
 
-    InputError where no legs can be found.
-    """
+    InputError where no legs can be found."""
     tips = (skeleton.end_parents, skeleton.end_offsets.tobytes())
     return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
@@ -118,8 +117,7 @@ def identify(skeleton: Skeleton) -> Humanoid:
 def identify_posed(motion: Motion) -> Humanoid:
     """As `identify`, but where names say nothing left and right are told from the recorded poses.
 
-    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there.
-    """
+    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there."""
     skeleton = motion.skeleton
     parts = [side_and_part(name) for name in skeleton.names]
     roles = _named(parts)
@@ -157,8 +155,7 @@ def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, i
 def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
     """A body from what is known about it. roles: "hips", "neck", "head", "left upper_leg" and the like -> joint.
 
-    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs.
-    """
+    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs."""
     roles = dict(roles)
     if not _has_legs(roles):
         missing = [part for part in _LEG_ROLES if part not in roles]
@@ -240,8 +237,7 @@ def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndar
     """Facing about Z, radians, 0 along +X: (..., J, 3) world positions -> (...,).
 
     Across = from right to left upper legs plus from right to left upper arms, so that neither a twisted pelvis nor
-    twisted shoulders alone decide; facing is across x up.
-    """
+    twisted shoulders alone decide; facing is across x up."""
     body = identify(skeleton)
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
     if body.left.upper_arm is not None and body.right.upper_arm is not None:

@@ -28,8 +28,7 @@ def soft_distance(distance: np.ndarray, longest: np.ndarray, soft: float | np.nd
     """The reach that is played for an asked one, metres: exact up to `soft` below the limb's length, then nearing it.
 
     distance (...,) asked, longest (...,) upper plus lower bone, soft one or (...,); C1, so that a knee does not snap
-    straight. xp: array module, numpy or jax.numpy.
-    """
+    straight. xp: array module, numpy or jax.numpy."""
     start = longest - soft
     beyond = xp.maximum(distance - start, 0.0)
     return xp.where(distance > start, longest - soft * xp.exp(-beyond / soft), distance)
@@ -73,8 +72,7 @@ def bend(
 def bone_frame(direction: np.ndarray, hinge: np.ndarray) -> np.ndarray:
     """Rotations (..., 4) that turn -Z onto `direction` (..., 3) and +Y onto the part of -`hinge` that is square to it.
 
-    A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity.
-    """
+    A leg that hangs straight down with its knee pointing along +X has direction -Z and hinge -Y: the identity."""
     left = -(hinge - np.sum(hinge * direction, axis=-1, keepdims=True) * direction)
     left = _unit_across(left, direction)
     forward = cross(left, -direction)
@@ -104,8 +102,7 @@ def two_bone(
     `soft_distance`: the miss is at most soft / e = 0.37 soft where the target is in reach.
 
     Bones are never stretched; a target out of reach is neared along the line from the upper joint.
-    Raises InputError where a joint does not hang below the one before. Source: Tolani, Goswami and Badler 2000.
-    """
+    Raises InputError where a joint does not hang below the one before. Source: Tolani, Goswami and Badler 2000."""
     _check_chain(skeleton, joints)
     places, world = pose_kinematics(skeleton, root, rotations)
     end: dict[str, Any] = {"end_rotation": end_rotation, "keep_end_rotation": keep_end_rotation}

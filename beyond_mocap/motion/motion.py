@@ -22,8 +22,7 @@ class Motion:
     """A skeleton's movement (Faustino §2.3.1 eq. 4).
 
     root_positions: (T, 3) metres, world, Z up. rotations: (T, J, 4) unit quaternions, each relative to its parent (the
-    root's to the world), sign-continuous over time. fps: frames per second.
-    """
+    root's to the world), sign-continuous over time. fps: frames per second."""
 
     skeleton: Skeleton
     root_positions: np.ndarray
@@ -70,8 +69,7 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """World positions (..., J, 3) and rotations (..., J, 4) from roots (..., 3) and local rotations (..., J, 4).
 
-    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
-    """
+    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here."""
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
     world = np.empty_like(flat)
@@ -134,8 +132,7 @@ def end_positions(motion: Motion) -> np.ndarray:
 def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root positions (N, 3) and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion.
 
-    Positions linear, rotations slerped: Faustino §3.3.2.
-    """
+    Positions linear, rotations slerped: Faustino §3.3.2."""
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
     low = np.minimum(np.floor(frames).astype(int), max(len(motion) - 2, 0))
     high = np.minimum(low + 1, len(motion) - 1)
@@ -152,8 +149,7 @@ def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
     Linear steps (`at_frames`) go round corners at every frame. Joints that turn fast are followed much better by
     splines of their rotations than by splines of where they are: a hand that throws at 20 m/s, given 30 times a second,
-    has its velocity within 1 %; by places it would lose 10 %.
-    """
+    has its velocity within 1 %; by places it would lose 10 %."""
     from scipy.interpolate import CubicSpline
 
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)

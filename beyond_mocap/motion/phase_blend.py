@@ -97,8 +97,7 @@ def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motio
     """Locomotion at `speed` m/s, in the mean, mixed from two recordings on one skeleton; from the origin along +X.
 
     Gives the motion at `fps` and standing (T, 2, 2) bool. As many steps as the shorter recording has, each mixed from
-    another one of both. A speed outside the two recordings' is brought to the nearer one.
-    """
+    another one of both. A speed outside the two recordings' is brought to the nearer one."""
     slow, fast = _in_step(slow, fast)
     steps = min(slow.steps, fast.steps)
     weight = _weight(slow, fast, steps, speed)
@@ -153,8 +152,7 @@ def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """How many frames (T, 2, 2) away the nearest begin or end of a stance is, negative outside of stances.
 
     Mixing these distances moves begin and end of a stance from one recording's to the other's; mixing the labels would
-    let it jump halfway.
-    """
+    let it jump halfway."""
     out = np.empty((len(frames), 2, 2))
     for side in (_LEFT, _RIGHT):
         for point in (0, 1):

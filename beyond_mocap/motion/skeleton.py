@@ -24,8 +24,7 @@ class Skeleton:
 
     names: J joint names. parents: J indices, -1 for the one root, which is joint 0; parents stand before children.
     offsets: (J, 3) metres, from the parent's joint to this one while no joint is rotated, Z up; the root's is zero.
-    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own.
-    """
+    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own."""
 
     names: tuple[str, ...]
     parents: tuple[int, ...]

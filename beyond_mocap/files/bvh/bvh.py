@@ -57,8 +57,7 @@ def read(path, unit: float | None = None) -> BvhClip:
     unit: metres per file unit; None guesses it from the hip height and tells it in the notes. Position channels of any
     joint replace its OFFSET, as Bandai-Namco's and LAFAN1's files mean them; below the hips their mean is the bone, and
     the notes say where they moved by more than 1 mm. Joints above the hips are folded into the hips. Rates within 0.1 %
-    of a whole number or an NTSC rate are taken to be that. Raises InputError for anything that is no sound BVH file.
-    """
+    of a whole number or an NTSC rate are taken to be that. Raises InputError for anything that is no sound BVH file."""
     if unit is not None and not (np.isfinite(unit) and unit > 0):
         raise InputError("unit", str(unit), "metres per file unit, above 0", "0.01 for centimetres")
     text = bvh_text.parse(path)
@@ -83,8 +82,7 @@ def write(path, motion: Motion, form: BvhForm | None = None) -> tuple[str, ...]:
     rotations) and other joints three. A joint whose motion needs a channel that its form lacks gets all of that kind. A
     root above the hips that stood still is put back as it was; one that moved is put on the ground below the hips
     (where the hips cannot move in it: where they are) and turned with the body's facing. The file is written beside and
-    then renamed, so a half-written one is never seen. Raises InputError where the folder cannot be written.
-    """
+    then renamed, so a half-written one is never seen. Raises InputError where the folder cannot be written."""
     target = Path(path)
     if not target.name:
         raise InputError(path, "no file name", "a BVH file to write")
@@ -98,8 +96,7 @@ class BvhRows:
     """How single rows of numbers of one hierarchy become poses, for rows that come one by one.
 
     text: the hierarchy with a first row, by which unit and axes are guessed (`unit`: metres per unit, where it is
-    known). skeleton: the body's, as of the first row. InputError as `read`.
-    """
+    known). skeleton: the body's, as of the first row. InputError as `read`."""
 
     def __init__(self, text: BvhText, unit: float | None = None):
         self.text = text
@@ -257,8 +254,7 @@ def rotation_of(values: np.ndarray, columns: list[tuple[str, int]], up: str) -> 
     """A joint's rotations in our axes, components first (4, T), from `columns`: letters and columns of `values` (T, C).
 
     Intrinsic, in the channels' order, degrees (Faustino §4.2.1 eq. 30-31). The turns are multiplied in closed form:
-    each has two components only.
-    """
+    each has two components only."""
     out = np.zeros((4, len(values)))
     out[0] = 1.0
     columns = [(letter, column) for letter, column in columns if values[:, column].any()]  # many never move
@@ -282,8 +278,7 @@ def guess_scale(text: BvhText, unit: float | None) -> Scale:
 
     Up is the axis, Y or Z, along which feet to head point (within 35 degrees) in more of 64 frames spread over the
     clip; the rest pose has a say where most of the clip is lain down. The unit is the usual one that puts the hips 0.75
-    to 1.15 m above the feet, else the one that makes legs 0.88 m long. Without legs: centimetres, Y up.
-    """
+    to 1.15 m above the feet, else the one that makes legs 0.88 m long. Without legs: centimetres, Y up."""
     rest = Skeleton(text.names, text.parents, to_ours(text.offsets, "Y"))
     try:
         body = identify(rest)

@@ -32,8 +32,7 @@ class BvhText:
 
     names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
     end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file
-    order. first_row: line of the first frame. renamed: names that stood twice, with what they became.
-    """
+    order. first_row: line of the first frame. renamed: names that stood twice, with what they became."""
 
     path: Path
     names: tuple[str, ...]

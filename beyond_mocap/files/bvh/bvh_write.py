@@ -27,8 +27,7 @@ class RootAbove:
     moves: whether it travelled with the body (LAFAN1's SimulationBone) instead of standing still (Bandai's joint_Root).
     position: (3,) metres, rotation: (4,), relative to the joint above it; constant, of the first frame where it moves.
     heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in
-    it, where it stands right above hips that have no position channels of their own.
-    """
+    it, where it stands right above hips that have no position channels of their own."""
 
     name: str
     channels: tuple[str, ...]
@@ -44,8 +43,7 @@ class BvhForm:
     """What writing back needs beyond the motion.
 
     channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y"
-    or "Z", as read (files are always written in centimetres with Y up).
-    """
+    or "Z", as read (files are always written in centimetres with Y up)."""
 
     channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     above: tuple[RootAbove, ...] = ()
@@ -58,8 +56,7 @@ class _Joint:
     """A joint as it is to stand in the file, centimetres and degrees, Y up.
 
     depth: how many stand above it. offset: (3,). channels: names in order. columns: (T, channels). ends: (E, 3) tips.
-    added: channels that its form lacked.
-    """
+    added: channels that its form lacked."""
 
     name: str
     depth: int
@@ -89,8 +86,7 @@ def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     """Angles (T, 3) in degrees of rotations (T, 4) in the order of `letters`, completed to a permutation of XYZ.
 
     Three letters: the middle angle within +-90 degrees. Fewer: of the two triples that make a rotation, (a, b, c) and
-    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero and can be left out.
-    """
+    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero and can be left out."""
     order = letters + "".join(axis for axis in "ZXY" if axis not in letters)
     angles = np.degrees(quaternion.to_euler(rotations, order))
     if len(letters) == 3:

@@ -101,8 +101,7 @@ def to_metres(system, length: float, width: float, upward: bool):
 
     kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is
     linear. upward: y grows upward whatever the system says. kloppy turns the y of Metrica's CSV over while reading and
-    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y does.
-    """
+    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y does."""
     size = system.pitch_dimensions
     x, y = size.x_dim, size.y_dim
     scale = {"METERS": (1.0, 1.0), "CENTIMETERS": (0.01, 0.01)}.get(size.unit.name)

@@ -188,8 +188,7 @@ def mended_sides(times, positions, ball, periods, teams) -> tuple[np.ndarray, np
     Teams change ends at half time: where they do not, the feed has turned one half for attack to go one way, and the
     second one is turned back. A player keeps to his side of the team: where left backs become right backs, the half is
     mirrored and its y changes sign. teams: P of "home", "away", "referee"; periods: (start, end) s, in order; the third
-    and fourth, of extra time, are a pair too.
-    """
+    and fourth, of extra time, are a pair too."""
     positions, ball, lines = np.array(positions), np.array(ball), []
     teams = np.array(teams)
     for first in range(0, len(periods) - 1, 2):

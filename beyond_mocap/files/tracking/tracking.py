@@ -48,8 +48,7 @@ def read_track_csv(path: str | os.PathLike) -> Track:
 
     Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
     `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
-    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
-    """
+    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz."""
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
     player = _cells(rows, ("time_s", "x_m", "y_m"))

@@ -44,8 +44,7 @@ class Signals:
     fps: the recording's own rate; count: its frames. frames (N,): the fractional frames of N samples at RATE.
     middle (N, 2, 6), paired (N, 2, 5, 6): of each point (MIDDLE; left and right PAIRED) place against the pelvis and
     velocity times 0.12 s, x forward, y left, z up, in legs. trunk (N, 8): pelvis's height in legs, its velocity in
-    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m.
-    """
+    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m."""
 
     fps: float
     count: int

@@ -44,8 +44,7 @@ class _Side:
 def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Classifier:
     """A classifier of all acts that at least two moments or one second of stretches show.
 
-    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough.
-    """
+    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough."""
     from threadpoolctl import threadpool_limits
 
     from ...base.errors import Cancelled

@@ -40,8 +40,7 @@ def smoothing_spline(
     values: (N, K). at: (N,) parameters, rising. pieces: how many of even width. stiff: in the parameter's unit; waves
     shorter than some six times it are taken out. order: 2 or 3. weights: (N,), else 1. closed: the end joins the
     beginning (`domain` then is one round, `pieces` at least 8). ends_met: the first and last value are kept exactly.
-    domain: the first and last parameter, else of `at`.
-    """
+    domain: the first and last parameter, else of `at`."""
     low, high = domain or (float(at[0]), float(at[-1]))
     knots = _knots(low, high, pieces, closed)
     values = np.asarray(values, dtype=float)
@@ -66,8 +65,7 @@ def spline_within(
     """`smoothing_spline` of least acceleration that is nowhere much farther than `slack` from the values.
 
     Where it is, the values around pull more, round by round: it is as smooth as it may be elsewhere. pieces: to begin
-    with; where pulling does not help they are halved, down to one from value to value.
-    """
+    with; where pulling does not help they are halved, down to one from value to value."""
     from scipy.interpolate import BSpline
 
     weights, around = np.ones(len(at)), int(_AROUND * stiff * (len(at) - 1) / (at[-1] - at[0])) + 1
@@ -92,8 +90,7 @@ def spline_pieces(length: float, stiff: float) -> int:
 def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "smooth"):
     """The line (T, 2) metres and its facing (T,) radians, from the pelvis's places (T, 2) and facing (T,), unwrapped.
 
-    way: one of WAYS.
-    """
+    way: one of WAYS."""
     line = _within(places, fps, SLACK)
     if way == "smooth":
         return line, _within(facing[:, None], fps, TURN_SLACK)[:, 0]
@@ -146,8 +143,7 @@ def _bends(knots: np.ndarray, order: int, factor: float) -> tuple[np.ndarray, np
     the squared derivative.
 
     The third derivative is constant on a piece; the second runs evenly from a to b: the integral of its square is
-    h ((a + b) / 2)^2 + h (b - a)^2 / 12.
-    """
+    h ((a + b) / 2)^2 + h (b - a)^2 / 12."""
     piece = np.arange(len(knots) - 2 * DEGREE - 1)[:, None]
     rows = np.broadcast_to(np.eye(_WIDTH), (len(piece), _WIDTH, _WIDTH))
     for level in range(order):

@@ -32,8 +32,7 @@ class Terrain:
     def heights(self, places: np.ndarray, below: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The highest ground not above `below` (N,) metres at places (N, 2): heights (N,), unit normals (N, 3) up.
 
-        NaN where there is none.
-        """
+        NaN where there is none."""
         places, below = np.asarray(places, dtype=float), np.asarray(below, dtype=float)
         asked, triangle = self._candidates(places)
         shares = np.einsum("pi,pij->pj", places[asked] - self._first[triangle, :2], self._inverse[triangle])

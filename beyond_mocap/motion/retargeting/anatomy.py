@@ -48,8 +48,7 @@ class Anatomy:
 
     axes (J, 4): F_j as quaternions, for the joints in `known`; the identity for others. still (J, 4): mean local
     rotations, for joints without a meaning. leg: thigh plus shank, metres. ankle: its height over the ground when the
-    foot is flat, metres. ball: the toe joint's height then.
-    """
+    foot is flat, metres. ball: the toe joint's height then."""
 
     skeleton: Skeleton
     body: Humanoid
@@ -86,8 +85,7 @@ def study(
     """The anatomy of `skeleton`, whose joints mean what `body` says.
 
     example: a recording on it (its bones' lengths are not looked at); without one the rest pose is taken. standing (T,
-    2) bool: which foot of the example stands; without it feet count as standing where they are low.
-    """
+    2) bool: which foot of the example stands; without it feet count as standing where they are low."""
     return _Study(skeleton, body, example, standing).anatomy()
 
 

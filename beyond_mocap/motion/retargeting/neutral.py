@@ -141,8 +141,7 @@ def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Moti
     """How steeply, radians, the line from ankle to toe joint falls while the sole is flat.
 
     In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that is
-    no standing foot.
-    """
+    no standing foot."""
     if example is not None and limb.toe is not None:
         places, _ = forward_kinematics(example)
         ankle = places[:, limb.foot]

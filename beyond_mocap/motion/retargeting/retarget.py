@@ -51,8 +51,7 @@ class Retargeter:
     """Carries recordings of one rig to another, at their own rate: both are studied once.
 
     Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
-    gives the motion back.
-    """
+    gives the motion back."""
 
     def __init__(
         self, sample: Motion, skeleton: Skeleton, bone_map: dict[str, str] | str | Path | None = None, *,
@@ -66,8 +65,7 @@ class Retargeter:
         its rig twists its bones and holds its trunk; without it the rest pose does. standing, example_standing (T, 2)
         bool: left and right foot on the ground in `sample` and in `example`, which tells how soles lie; without it low
         feet count as standing. keeps_travel: footprints and the way over the ground stay where they are, whatever the
-        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint.
-        """
+        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint."""
         self.keeps_travel = keeps_travel
         self.pairs = pair_joints(sample, skeleton, bone_map, example)
         self.source = study(sample.skeleton, self.pairs.source, sample, standing)
@@ -319,8 +317,7 @@ def pair_joints(
     """The joints of `motion`'s skeleton and of `skeleton` that belong together.
 
     bone_map: as `load_bone_map` returns it, or a path. example: a recording on `skeleton`, whose poses show left from
-    right where its names do not. Raises InputError for a map with unknown names and for skeletons without legs.
-    """
+    right where its names do not. Raises InputError for a map with unknown names and for skeletons without legs."""
     where = str(bone_map) if isinstance(bone_map, (str, Path)) else "bone map"
     table = load_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
     links = {_index(motion.skeleton, mine, where): _index(skeleton, its, where) for mine, its in table.items()}

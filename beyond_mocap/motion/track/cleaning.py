@@ -56,8 +56,7 @@ def clean(track: Track) -> tuple[Track, DataReport]:
     intervals, are put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends
     with their velocities (beyond one second only as curved as the distance allows); before the first and after the last
     believed sample, the velocity fades (to a third in half a second). A track that is already clean comes back equal.
-    InputError where fewer than two samples have a position, or a gap is longer than an hour.
-    """
+    InputError where fewer than two samples have a position, or a gap is longer than an hour."""
     times, positions, ball, notes, dropped, merged = _in_order(track)
     ball, notes = _real_ball(ball, notes)
     times, positions, ball = _with_missing_rows(times, positions, ball, track.name)
@@ -156,8 +155,7 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
     off theirs equally, so neither stands out and steps are left to `_jumps`. The first and last sample have one
-    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second.
-    """
+    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second."""
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 5:
         return wrong
@@ -211,8 +209,7 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
 
 def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
     """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on
-    back while they lie on an exact line. The first of such a line is where the player was last seen, and is kept.
-    """
+    back while they lie on an exact line. The first of such a line is where the player was last seen, and is kept."""
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
     for start in range(min(first, jump - 3), -1, -1):

@@ -25,8 +25,7 @@ class Track:
     +x. ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
     ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number. filled: (N,)
     bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the feed was
-    wrong; None means none. name: who this is, for messages. Arrays are read-only copies.
-    """
+    wrong; None means none. name: who this is, for messages. Arrays are read-only copies."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -81,8 +80,7 @@ class SampledTrack:
     speed: (T,) m/s. direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,)
     bool, False within a long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3)
     metres, NaN where there is no ball at all. ball_measured: (T,) bool, False where it lies between samples too far
-    apart. fps: frames per second.
-    """
+    apart. fps: frames per second."""
 
     times: np.ndarray
     positions: np.ndarray

@@ -34,8 +34,7 @@ def along(
     rising, the first 0 and the last the line's length. speeds: (P,) m/s at the points. waits: (P,) seconds that are
     spent where the speed is 0. start: seconds of the first sample. name: for messages. Samples lie 1 / HZ s apart,
     nearly: the first and the last are the line's ends. InputError for a line that is too short, two stops in a row,
-    speeds that are none or beyond FASTEST.
-    """
+    speeds that are none or beyond FASTEST."""
     line, arc, speeds, waits = (np.asarray(values, dtype=float) for values in (line, arc, speeds, waits))
     _check(line, arc, speeds, name)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)

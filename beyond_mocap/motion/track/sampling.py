@@ -30,8 +30,7 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
 
     window: seconds of `smoothed`.
     The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
-    radius, which is also its height where the feed has none. InputError below two measured samples.
-    """
+    radius, which is also its height where the feed has none. InputError below two measured samples."""
     times, fine, step = _grids(track, fps)
     positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
@@ -54,8 +53,7 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
     the sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples,
     mean / 95 %: Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one
     0.18 / 0.5 cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The
-    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
-    """
+    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise."""
     out = zero_phase_hann(positions, fps, window)
     for _ in range(2):
         out = out + zero_phase_hann(positions - out, fps, window)
@@ -65,8 +63,7 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
 def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarray:
     """`values` (T, k) at `fps` under a symmetric Hann window `seconds` long; the ends are point-reflected.
 
-    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope.
-    """
+    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope."""
     values = np.asarray(values, dtype=float)
     half = max(int(np.ceil(seconds * fps / 2.0 - 1e-9)) - 1, 0)
     if half == 0 or len(values) < 2:
@@ -81,8 +78,7 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
 
     Slower frames keep the direction they came with, and turn to the next one in the last half second before it: a
     player who stands does not spin with the noise, and does not snap round when setting off. All slow: the direction of
-    the frame that is fastest, 0 if none moves.
-    """
+    the frame that is fastest, 0 if none moves."""
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
     if not len(moving) or not speed.any():
