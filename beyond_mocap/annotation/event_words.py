@@ -51,8 +51,7 @@ _STEP = "see docs/match/match-input.md"
 
 @dataclass(frozen=True)
 class EventRow:
-    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "" for any, words as written, with
-    braces."""
+    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "", words with braces."""
 
     kind: str
     part: str

@@ -178,7 +178,7 @@ def problems(
     known = vocabulary_words(known_words)
     found: list[InputError] = []
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
-    for item in sorted(items, key=_first_time):
+    for item in sorted(items, key=lambda item: item.start if isinstance(item, Span) else item.time):
         place = where if item.line is None else f"{where}:{item.line}"
         found += [*_word_problems(item, known, place), *_time_problems(item, start, end, place)]
     return found + _overlaps(timeline, where)
@@ -204,10 +204,6 @@ def missing_keys(
     held = [tuple(choice) for choice in choices]
     lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
     return [(key, nearest(key.words, held, count)) for key in lacking]
-
-
-def _first_time(item: Span | KeyMoment) -> float:
-    return item.start if isinstance(item, Span) else item.time
 
 
 def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:

@@ -69,8 +69,7 @@ def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
 
 
 def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
-    """Convex polygons (F, 4, 2) pixels, whichever way round, one after the other; colours (F, 4) take the place of what
-    was there."""
+    """Convex polygons (F, 4, 2) pixels, one after the other; colours (F, 4) take the place of what was there."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
     onward = np.roll(corners, -1, axis=1) - corners

@@ -63,13 +63,9 @@ def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
     edges = standing[triangles[:, 1:]] - standing[triangles[:, :1]]
     normal = np.cross(edges[:, 0], edges[:, 1])
     size = np.linalg.norm(normal, axis=1)
-    trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[_widest(standing, triangles)], 0]))
+    middle = np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1  # near the middle plane: those are no sleeves
+    trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[middle], 0]))
     return triangles[trunk & (outward * normal[:, 0] > 0.2 * size) & (size > 1e-9)]
-
-
-def _widest(standing: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(K,) bool: triangles near the middle plane: those are no sleeves."""
-    return np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1
 
 
 def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

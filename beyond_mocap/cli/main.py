@@ -89,8 +89,7 @@ def main(
 
 
 def _escape(stream) -> None:
-    """Lets a stream write what its encoding lacks as escapes, where it would raise: names of files and people on a
-    console of another script."""
+    """Lets a stream write what its encoding lacks as escapes instead of raising: names on a foreign console."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 

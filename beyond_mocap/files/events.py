@@ -153,8 +153,7 @@ def _ends(match: Match | None) -> dict[int, float]:
 
 
 def translate_kind(event, tells_foot: bool) -> tuple[str, str, str, tuple[str, ...], bool | None]:
-    """Kind, part, side, details and success of one of kloppy's events. tells_foot: whether its provider tells left
-    feet from right ones."""
+    """Kind, part, side, details, success of one of kloppy's events. tells_foot: left feet are told from right ones."""
     names = [_name_of_qualifier(one) for one in getattr(event, "qualifiers", None) or ()]
     result = getattr(getattr(event, "result", None), "name", "")
     success = True if result in _GOOD else False if result in _BAD else None

@@ -88,7 +88,8 @@ class Library:
     @cached_property
     def feet_standing(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
-        return np.concatenate([_standing(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
+        stands = (clip.standing.any(axis=2)[_nearest(clip, self._own_frames(i))] for i, clip in enumerate(self.clips))
+        return np.concatenate(list(stands))
 
     def _own_frames(self, clip: int) -> np.ndarray:
         first = self.frames.first[clip]
@@ -150,11 +151,6 @@ def _made(library: Library) -> Library:
         return replace(library, clips=())
     frames = describe_clips(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
-
-
-def _standing(clip: Clip, source: np.ndarray) -> np.ndarray:
-    """(T, 2) of one clip at its frames `source` (T,)."""
-    return clip.standing.any(axis=2)[_nearest(clip, source)]
 
 
 def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:

@@ -1,8 +1,7 @@
 """What the recordings lack, made from them: speeds between and above them, kicks and taken balls on the run.
 
 Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
-to 1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a
-gap.
+to 1.125 of its rate covers some speeds around its own; where too few seconds reach a speed that way is a gap.
 
 Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk
 and a run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a

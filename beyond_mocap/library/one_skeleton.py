@@ -52,11 +52,9 @@ def bring(
 
 
 def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
-    """`motion` on the skeleton of `target`, a recording or a pose of it, feet held where they stood; its rate and
-    floor.
+    """`motion` on the skeleton of `target`, a recording or pose of it, feet held where they stood; same rate and floor.
 
-    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as
-    there."""
+    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays. Raises InputError as there."""
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(
         motion, target.skeleton, bone_map, example=target,

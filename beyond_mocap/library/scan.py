@@ -57,8 +57,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
 
 
 def own_recordings(folder: str | Path) -> list[Path]:
-    """The recordings that are a library's clips, as `find_recordings`: of two of one name (`kick.bvh` beside
-    `kick.fbx`) the BVH file."""
+    """The recordings that are a library's clips, as `find_recordings`: of `kick.bvh` beside `kick.fbx` the former."""
     found = find_recordings(folder)
     plain = {path.with_suffix("") for path in found if not is_foreign(path)}
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]

@@ -52,8 +52,7 @@ def ground_height(motion: Motion) -> float:
 
 
 def recorded_floor(motion: Motion) -> tuple[float, float]:
-    """The height in metres of the floor that a recording was made on, and how high over it the foremost joint of a foot
-    is that stands flat.
+    """The height in metres of the floor of a recording, and how high over it the foremost joint of a flat foot is.
 
     That floor is at height 0 where the soles are as near to it as soles and toe joints of recordings are (toe joints of
     CMU are 4 to 6 cm over it, of Bandai 4, of the made gait 2); else it is as high as `ground_height`."""

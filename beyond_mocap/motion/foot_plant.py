@@ -212,8 +212,7 @@ def held_shift(
     velocity: np.ndarray, weight: np.ndarray, scale: float, most: float = MOST_SHIFT
 ) -> tuple[np.ndarray, np.ndarray]:
     """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than `most` metres
-    are held less firmly, since a foot that slides looks better than a leg torn after it (give-way order,
-    ../shared/metrics.md)."""
+    are held less firmly, since a foot that slides looks better than a leg torn after it (../shared/metrics.md)."""
     ground = shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)

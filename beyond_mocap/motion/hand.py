@@ -73,13 +73,10 @@ def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     forearm = float(np.linalg.norm(skeleton.offsets[hand]))
     usual = _HAND_OF_ARM * forearm
     tips = _tips(skeleton, hand)
-    lengths = np.linalg.norm(tips, axis=-1) if len(tips) else np.zeros(0)
-    if len(lengths) and 0.6 * usual < lengths.max() < 1.5 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), float(lengths.max())
-    if len(lengths) and lengths.max() > 0.1 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), usual
+    lengths = np.linalg.norm(tips, axis=-1)
+    longest = float(lengths.max(initial=0.0))
+    if longest > 0.1 * usual:
+        return tips[int(np.argmax(lengths))] / longest, longest if 0.6 * usual < longest < 1.5 * usual else usual
     return skeleton.offsets[hand] / max(forearm, 1e-9), usual
 
 

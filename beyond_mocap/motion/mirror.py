@@ -108,8 +108,7 @@ def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndar
 
 
 def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
-    """The D (3, 3) of a joint from `usual` (D, 3, 3): how well it carries bones to bones (`pair`), and the mean
-    local rotations.
+    """The D (3, 3) of a joint from `usual` (D, 3, 3): how it carries bones to bones (`pair`), and mean rotations.
 
     In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average. `before`: the
     parent's D, None at the root, whose rotation has no parent to be compared with."""

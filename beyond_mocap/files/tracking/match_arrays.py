@@ -64,13 +64,9 @@ def _shirt(player) -> tuple[str, int, str]:
 
 def described(player) -> tuple[str, str, str, str, str]:
     """Id, team, name, number and position of one of kloppy's players."""
-    id_, shirt = str(player.player_id), player.jersey_no
+    id_, shirt = str(player.player_id), str(-1 if player.jersey_no is None else int(player.jersey_no))
     ground = str(player.team.ground)
-    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, _number(shirt), _position(player)
-
-
-def _number(shirt) -> str:
-    return str(-1 if shirt is None else int(shirt))
+    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, shirt, _position(player)
 
 
 def _position(player) -> str:

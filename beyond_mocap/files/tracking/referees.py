@@ -1,5 +1,4 @@
-"""What kloppy leaves out of tracking, read here for the providers that have it: referees, and the colours of the teams'
-shirts."""
+"""What kloppy leaves out of tracking, read here for the providers that have it: referees, and the colours of shirts."""
 
 from __future__ import annotations
 

@@ -49,8 +49,7 @@ class Act:
     """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
     its confidence (`kernel.compute_confidence`). silent: what counts as the rules' confidence where they say nothing.
     shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1
-    for the score's own; lead: seconds by which the key comes after that peak. before, after: seconds of a row around
-    its key."""
+    for the score's own; lead: seconds from that peak to the key. before, after: seconds of a row around its key."""
 
     word: str
     moment: bool

@@ -73,7 +73,7 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
 
 def _space(examples: Sequence[Example]) -> Space:
     """The space of the windows of all clips, of evenly spaced ones where they are too many."""
-    sides = [side for one in examples for side in _sides(one)]
+    sides = [side for one in examples for side in (one.signals, one.signals.mirrored)]
     step = max(1, -(-sum(map(len, sides)) // _WINDOWS))
     return Space.of(np.concatenate([windows(side)[::step] for side in sides]), _COMPONENTS)
 
@@ -88,10 +88,6 @@ def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
             length = 1.0 if moment else (row.end - row.start) / one.signals.fps
             found[kind] = found.get(kind, 0.0) + length
     return {kind: shown for kind, shown in sorted(found.items()) if kind[0] and shown >= (2.0 if kind[1] else 1.0)}
-
-
-def _sides(example: Example):
-    return example.signals, example.signals.mirrored
 
 
 def _twins(example: Example, space: Space) -> list[_Side]:

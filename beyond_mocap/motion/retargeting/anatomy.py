@@ -4,8 +4,7 @@ Rest poses and axes of rigs differ (CMU's legs splay, LAFAN1's limbs all lie alo
 is the same in all of them is the body: a thigh runs from hip to knee and its knee bends backward about one axis. For
 each joint j we look for the anatomical frame F_j: the rotation whose columns are the segment's forward, left and up
 directions in the joint's own axes when the body stands upright, facing +X, arms hanging. Then W_j F_j, with W_j the
-joint's rotation in the world, is how the *segment* is turned, in words that hold for every skeleton, and no rest pose
-occurs in it.
+joint's rotation in the world, is how the *segment* is turned, in words that hold for any skeleton, without rest poses.
 
 Directions along bones and between hips are known from the offsets alone. What they leave open comes from recorded
 frames: knees and elbows are hinges, so thigh x shank is the knee's axis wherever it bends; a sole is level while the
@@ -312,10 +311,7 @@ def _fingers(skeleton: Skeleton, hand: int) -> np.ndarray | None:
 
 def _mean_rotation(rotations: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The weighted mean (4,) of rotations (T, 4): the eigenvector of sum w q q^T (Markley et al. 2007)."""
-    return _positive(np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1])
-
-
-def _positive(q: np.ndarray) -> np.ndarray:
+    q = np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1]
     return q if q[0] >= 0.0 else -q
 
 

@@ -1,8 +1,7 @@
 """The neutral stance of any humanoid skeleton: upright, facing +X, legs straight down, arms hanging, soles flat.
 
 Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever
-is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all of
-them."""
+is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all."""
 
 from __future__ import annotations
 

@@ -1,8 +1,7 @@
 """A body's movement in anatomical terms, and how any humanoid skeleton takes it on.
 
 A `Posture` says where the pelvis is and how it is turned, how the trunk bends, what the arms do, and where the feet
-are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through the neutral
-stance."""
+are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through `neutral`."""
 
 from __future__ import annotations
 

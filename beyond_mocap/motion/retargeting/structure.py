@@ -22,8 +22,7 @@ _TELLING = 1e-2
 def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[str, int] | None:
     """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found.
 
-    tips (T, J, 3): where each joint's bone ends, the joint itself where that is not known; shows how toeless feet
-    point."""
+    tips (T, J, 3): where each joint's bone ends, the joint itself where unknown; shows how toeless feet point."""
     lengths = np.array([np.linalg.norm(places[0, j] - places[0, p]) if p >= 0 else 0.0 for j, p in enumerate(parents)])
     pairs = _limb_pairs(list(parents), lengths)
     if not pairs:

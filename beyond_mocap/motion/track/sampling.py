@@ -34,7 +34,9 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
     times, fine, step = _grids(track, fps)
     positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
-    velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2) if len(times) > 2 else _chord(positions, fps)
+    velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
+    if len(times) > 2:
+        velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2)
     speed = np.linalg.norm(velocity, axis=1)
     ball, ball_measured = _ball(track, times)
     return SampledTrack(
@@ -87,13 +89,9 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     frames = np.arange(len(velocity))
     before = np.clip(np.searchsorted(moving, frames, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(moving, frames), None, len(moving) - 1)
-    left = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, _pause(moving, before, after)), 0.0, 1.0)
+    pause = np.maximum(moving[after] - moving[before], 1)
+    left = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, pause), 0.0, 1.0)
     return angles[after] + (angles[before] - angles[after]) * left * left * (3.0 - 2.0 * left)
-
-
-def _pause(moving: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Frames from the moving frame before to the one after, at least 1."""
-    return np.maximum(moving[after] - moving[before], 1)
 
 
 def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
@@ -109,11 +107,6 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     count = int(np.floor(duration * fps + 1e-6)) + 1
     fine = track.times[0] + np.arange((count - 1) * step + 1) / (fps * step)
     return fine[::step], fine, step
-
-
-def _chord(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Velocity (T, 2) m/s of one or two frames."""
-    return np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)
 
 
 def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:
