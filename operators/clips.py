@@ -11,8 +11,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 
 from ..beyond_mocap.base.errors import Cancelled, InputError
 from ..beyond_mocap.files.bvh import bvh
-from ..beyond_mocap.library.converted import FOREIGN, is_foreign
-from ..beyond_mocap.library.scan import find_recordings
+from ..beyond_mocap.library.scan import FOREIGN, find_recordings, is_foreign
 from ..beyond_mocap.motion import humanoid
 from ..beyond_mocap.motion.mirror import mirror
 from ..beyond_mocap.motion.motion import Motion, place

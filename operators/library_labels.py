@@ -70,7 +70,7 @@ yours to add"""
     def do(self, context):
         """Look at the recording itself, then lay the strips."""
         from ..beyond_mocap.annotation import Timeline
-        from ..beyond_mocap.library.classify import keep
+        from ..beyond_mocap.library.classify import classifier
         from ..beyond_mocap.library.keep_words import as_timeline
         from ..beyond_mocap.library.proposals import GAITS, gaits_of, propose
 
@@ -81,7 +81,7 @@ yours to add"""
             gaits = gaits_of(built) if built is not None else GAITS
         except InputError:  # a library without locomotion says nothing of gaits
             gaits = GAITS
-        known = keep.read(absolute(settings.words_model)) if settings.words_model else None
+        known = classifier.read_classifier(absolute(settings.words_model)) if settings.words_model else None
         found = [one for one in propose(motion, gaits, known) if one.confidence >= self.least]
         if self.review:
             self.list_them(rig, context.scene, motion, found)
@@ -325,11 +325,11 @@ same acts in others. What is learned is kept in a file, which serves any library
     def work(order, progress, cancelled, _hurry):
         """Look at the clips, learn, and keep it; returns the file and what was learned, as lines."""
         from ..beyond_mocap.library import cache
-        from ..beyond_mocap.library.classify import keep
+        from ..beyond_mocap.library.classify import classifier
         from ..beyond_mocap.library.classify.examples import examples_of
         from ..beyond_mocap.library.classify.train import trained
 
-        out = Path(order.out) if order.out else cache.place(Path(order.folder), order.cache)[0] / keep.NAME
+        out = Path(order.out) if order.out else cache.place(Path(order.folder), order.cache)[0] / classifier.FILE_NAME
         looked = lambda done, text: progress(0.7 * done, text)  # noqa: E731
         notes = []
         examples = examples_of(order.folder, order.unit, looked, cache_dir=order.cache, cancelled=cancelled,
@@ -337,7 +337,7 @@ same acts in others. What is learned is kept in a file, which serves any library
         known = trained(examples, lambda done, text: progress(0.7 + 0.3 * done, text), cancelled)
         if not order.out:
             out.parent.mkdir(parents=True, exist_ok=True)
-        keep.write(out, known)
+        classifier.write_classifier(out, known)
         return str(out), (*known.told(), *notes)
 
     def apply(self, scene, result):

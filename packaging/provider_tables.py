@@ -11,7 +11,7 @@ PAGE = TOP / "docs" / "match" / "match-input.md"
 
 def with_tables(text):
     """The page with the rows of both tables, in their order, as the records have them."""
-    from beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
+    from beyond_mocap.files.event_providers import EVENT_PROVIDERS
     from beyond_mocap.files.tracking.providers import PROVIDERS
 
     tables = iter((PROVIDERS, EVENT_PROVIDERS))

@@ -13,8 +13,7 @@ import jax
 import numpy as np
 
 from beyond_mocap.base.errors import Cancelled, InputError
-from beyond_mocap.cli.outputs import check_outputs
-from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.cli.outputs import Told, check_outputs
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.throws.network_npz import write_model

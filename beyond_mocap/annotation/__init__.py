@@ -5,8 +5,7 @@
 - `timeline`    stretches and key moments, validation, filling with automatic locomotion
 - `text`        the text form of timelines (§4.2.2)
 - `clips`       what the library's clips are annotated with
-- `gaits`       which gait a speed asks for (§3.1.1)
-- `gaze`        which way a body faces while it goes
+- `gaits`       which gait a speed asks for (§3.1.1), and which way a body faces while it goes
 - `decision`    the vocabulary as a tree of choices on number keys, with what the library has of them
 - `annotating`  annotating by keys: what each does, without any window
 
@@ -48,40 +47,10 @@ from .vocabulary import (
 )
 
 __all__ = [
-    "CONTINUOUS",
-    "DISCRETE",
-    "LOCOMOTION",
-    "LOCOMOTION_WORDS",
-    "MUST_NOT",
-    "STANDING_SPEED",
-    "TRANSITION",
-    "VOCABULARY",
-    "ClipAnnotation",
-    "KeyMoment",
-    "Span",
-    "Timeline",
-    "automatic_gaits",
-    "avoided_per_frame",
-    "clip_annotations",
-    "fill",
-    "format_timeline",
-    "gait_thresholds",
-    "missing_keys",
-    "nearest",
-    "parse_timeline",
-    "problems",
-    "recorded_thresholds",
-    "read_annotation_csv",
-    "read_clip_annotations",
-    "read_text",
-    "read_timeline",
-    "relatives",
-    "similar_words",
-    "spelled",
-    "spoken",
-    "swap_sides",
-    "validate",
-    "vocabulary_words",
-    "words_below",
+    "CONTINUOUS", "DISCRETE", "LOCOMOTION", "LOCOMOTION_WORDS", "MUST_NOT", "STANDING_SPEED", "TRANSITION",
+    "VOCABULARY", "ClipAnnotation", "KeyMoment", "Span", "Timeline", "automatic_gaits", "avoided_per_frame",
+    "clip_annotations", "fill", "format_timeline", "gait_thresholds", "missing_keys", "nearest", "parse_timeline",
+    "problems", "recorded_thresholds", "read_annotation_csv", "read_clip_annotations", "read_text", "read_timeline",
+    "relatives", "similar_words", "spelled", "spoken", "swap_sides", "validate", "vocabulary_words", "words_below",
     "words_per_frame",
 ]

@@ -29,8 +29,7 @@ _FLIGHT_SECONDS = 0.6
 def striking_part(words: Iterable[str]) -> str | None:
     """Which part meets the ball: "foot", "head", "chest" or "hand"; None for words that touch no ball.
 
-    A receive is taken with the foot unless it says body or chest (Faustino App. A: receive foot | body).
-    """
+    A receive is taken with the foot unless it says body or chest (Faustino App. A: receive foot | body)."""
     words = set(words)
     return next((part for part, named in _BY_PART.items() if named & words), None)
 

@@ -19,8 +19,7 @@ _COLUMNS = ("file", "start_frame", "end_frame", "key_frame", "labels")
 @dataclass(frozen=True)
 class ClipAnnotation:
     """Words for a stretch of one clip. start, end: 0-based frames in the clip's own rate, end inclusive. key: the frame
-    of the key moment (the foot meets the ball), None for continuous motions. words: from root to leaf plus
-    modifiers."""
+    of the key moment (the foot meets the ball), None for none. words: from root to leaf plus modifiers."""
 
     start: float
     end: float
@@ -33,8 +32,7 @@ def read_clip_annotations(path: str | os.PathLike, fps: float) -> tuple[ClipAnno
 
     fps: the clip's rate; times become its nearest frames. A key line belongs to the shortest span around it that names
     the same action, and lends it its words; a key line on its own has no extent. Spans may overlap; spans without words
-    or with `transition` say nothing about a clip and are left out.
-    """
+    or with `transition` say nothing about a clip and are left out."""
     return clip_annotations(parse_timeline(read_text(path), str(path), fps), fps)
 
 
@@ -54,8 +52,7 @@ def read_annotation_csv(
 
     Columns file, start_frame, end_frame, key_frame, labels; others are ignored. A blank key_frame means none; rows
     without labels are left out, and those (column -> text) of which `but` is true. InputError names the line of a row
-    that is not of this form.
-    """
+    that is not of this form."""
     reader = csv.DictReader(io.StringIO(read_text(path), newline=""))
     found: dict[str, list[ClipAnnotation]] = {}
     try:
@@ -76,8 +73,7 @@ def _owner(key: KeyMoment, spans: list[Span]) -> Span | None:
 
 
 def _actions(item: Span | KeyMoment) -> set[str]:
-    """The words that name what is done: App. A's discrete roots, or all words where there is none ("slide", user
-    words)."""
+    """The words that name what is done: App. A's discrete roots, or all words without any ("slide", user words)."""
     words = set(item.words)
     return words & DISCRETE or words
 

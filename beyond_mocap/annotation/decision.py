@@ -4,8 +4,7 @@ has of them (Faustino §6.2 and Appendix A).
 Digits never move, so that fingers learn them. First come the roots of the tree in its order. After the root 1 is left
 and 2 is right wherever one is in the tree, 8 and 9 are the paces of a key moment (standing, running) or the ways of a
 stretch (front, back), and 3 to 7 are the tree's next words; what has no room follows on further pages, with the other
-modifiers, the rest of the root's branches and the library's own words behind. A level may be skipped, so that "kick
-top" needs no height.
+modifiers, the rest of the root's branches and the library's own words behind. A level may be skipped ("kick top").
 
     walk = Walk("moment")
     for word in ("kick", "right", "low", "top"):
@@ -49,8 +48,7 @@ class Walk:
 
 @dataclass(frozen=True)
 class Held:
-    """What a library holds: the word combinations of its key moments and those of its frames, mirrored ones
-    included."""
+    """What a library holds: the word combinations of its key moments and of its frames, with mirrored ones."""
 
     moments: tuple[frozenset[str], ...]
     spans: tuple[frozenset[str], ...]
@@ -75,8 +73,7 @@ class Option:
 
 
 def options(walk: Walk, held: Held | None = None) -> tuple[Option, ...]:
-    """What can be chosen next, by page and digit. held: None where no library is built; then nothing is known to be
-    missing."""
+    """What can be chosen next, by page and digit. held: None without a library; then nothing is missing."""
     return tuple(_option(word, place, walk, held) for place, word in enumerate(_layout(walk, held)) if word)
 
 

@@ -39,9 +39,7 @@ EVENT_KINDS = (
 
 KINDS = tuple(kind.name for kind in EVENT_KINDS)
 
-FILLED_IN = {
-    "side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",),
-}  # fmt: skip
+FILLED_IN = {"side": SIDES, "height": list_labels(group="height"), "gait": list_labels(group="pace"), "jump": ("jump",)}
 """What may stand in braces in a row's words, and the words that it becomes."""
 
 TABLE = Path(__file__).with_name("event_words.csv")
@@ -53,8 +51,7 @@ _STEP = "see docs/match/match-input.md"
 
 @dataclass(frozen=True)
 class EventRow:
-    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "" for any, words as written, with
-    braces."""
+    """A row of the table: kind of KINDS, part of BODY_PARTS or "" for any, detail or "", words with braces."""
 
     kind: str
     part: str
@@ -75,8 +72,7 @@ class EventWords:
 
         kind: of KINDS. part: of BODY_PARTS, "" where unknown. details: what else is known. filled_in: what stands for
         the names of FILLED_IN; those that are missing or "" are left out. Of the rows that fit, one that names the part
-        counts before one that does not, then one that names a detail, then the first.
-        """
+        counts before one that does not, then one that names a detail, then the first."""
         fitting = [row for row in self.rows if row.kind == kind and row.part in ("", part)]
         fitting = [row for row in fitting if not row.detail or row.detail in details]
         if not fitting:
@@ -91,8 +87,7 @@ def read_event_words(path: str | os.PathLike | None = None, known_words: Iterabl
     """The table in a CSV file of kind,part,detail,words; None: the one that comes with us.
 
     known_words: beyond the vocabulary. Lines that begin with # are comments. InputError, with the line, for kinds,
-    parts or words that are not known, and rows that say the same twice.
-    """
+    parts or words that are not known, and rows that say the same twice."""
     path = TABLE if path is None else path
     known, rows, seen = vocabulary_words(known_words), [], {}
     lines = read_text(path).splitlines()

@@ -44,8 +44,7 @@ class Label:
     ball: "sends", "takes", "carries", "never" or "". height: of the ball when it is met, or "".
     gait: m/s from which on the gait holds where no library says its own, None of what is no gait.
     in_flight: whether the body flies to the ball. action: what networks learn from clips with it, or "".
-    below: the tree below it, label -> labels below that.
-    """
+    below: the tree below it, label -> labels below that."""
 
     name: str
     title: str = ""

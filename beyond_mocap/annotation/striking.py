@@ -28,8 +28,7 @@ class Surface:
     """A striking surface: all that is within `radius` metres of the line between two points that joints carry.
 
     part: "foot", "head", "chest" or "hand". side: "left", "right" or "" (head, chest). start and end: a joint's index
-    and the point (3,) in metres in that joint's own frame.
-    """
+    and the point (3,) in metres in that joint's own frame."""
 
     part: str
     side: str
@@ -46,8 +45,7 @@ class Surface:
 
 
 def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left", "right")) -> tuple[Surface, ...]:
-    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where the skeleton lacks
-    it."""
+    """The surfaces of a part of BODY_PARTS: of foot and hand one for each of `sides`; none where there is none."""
     body = identify(skeleton)
     if part == "foot":
         return tuple(_foot(skeleton, side, getattr(body, side)) for side in sides)
@@ -63,8 +61,7 @@ def part_surfaces(skeleton: Skeleton, part: str, sides: Iterable[str] = ("left",
 def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     """The way (T, 3) m of the middle of that surface of `found` which comes furthest from the first frame to the last.
 
-    places (T, J, 3) m and rotations (T, J, 4): joints, world.
-    """
+    places (T, J, 3) m and rotations (T, J, 4): joints, world."""
     middles = [np.mean(surface.line(places, rotations), axis=0) for surface in found]
     return max(middles, key=lambda way: float(np.linalg.norm(way[-1] - way[0])))
 
@@ -74,8 +71,7 @@ def ball_gap(
 ) -> np.ndarray:
     """Signed gap (...,) m between a surface and the ball's, negative where they overlap.
 
-    line: the surface's two ends (..., 3) m, world; radius: the surface's, m; ball (..., 3): the ball's centre, m.
-    """
+    line: the surface's two ends (..., 3) m, world; radius: the surface's, m; ball (..., 3): the ball's centre, m."""
     return np.linalg.norm(ball - nearest_on(line, ball), axis=-1) - radius - ball_radius
 
 
@@ -92,8 +88,7 @@ def smallest_gap(
 ) -> np.ndarray:
     """The smallest gap (...,) m of the surfaces `found`, NaN without any; see `ball_gap`.
 
-    positions (..., J, 3) m and rotations (..., J, 4): joints, world; ball (..., 3): its centre, m.
-    """
+    positions (..., J, 3) m and rotations (..., J, 4): joints, world; ball (..., 3): its centre, m."""
     gaps = [ball_gap(s.line(positions, rotations), s.radius, ball) for s in found]
     return np.min(gaps, axis=0) if gaps else np.full(np.shape(ball)[:-1], np.nan)
 
@@ -102,14 +97,9 @@ def _foot(skeleton: Skeleton, side: str, limb: Limb) -> Surface:
     """From the ankle to the toe joint, or to the foot's end site where the skeleton has no toe joint."""
     if limb.toe is not None:
         return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.toe, _HERE))
-    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, _tip(skeleton, limb.foot)))
+    return Surface("foot", side, FOOT_RADIUS, (limb.foot, _HERE), (limb.foot, skeleton.tip(limb.foot)))
 
 
 def _head(skeleton: Skeleton, body: Humanoid) -> Surface:
-    middle = (body.head, 0.5 * _tip(skeleton, body.head))
+    middle = (body.head, 0.5 * skeleton.tip(body.head))
     return Surface("head", "", HEAD_RADIUS, middle, middle)
-
-
-def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
-    """From a joint to its first end site (3,) m in the joint's frame; zero where it has none."""
-    return next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == joint), _HERE)

@@ -28,8 +28,7 @@ def parse_timeline(text: str, where: str = "annotations", fps: float | None = No
     """The timeline that `text` spells.
 
     where: named in errors, as `where:line`. fps: rate of times given in frames, None where frames are not allowed.
-    start: seconds of the track's first time, where frame 0 is. InputError on a line that is not of the form.
-    """
+    start: seconds of the track's first time, where frame 0 is. InputError on a line that is not of the form."""
     unit, spans, keys = "seconds", [], []
     for number, line in enumerate(text.lstrip("\ufeff").splitlines(), start=1):
         tokens = line.split("#", 1)[0].split()

@@ -89,8 +89,7 @@ class KeyMoment:
 
 @dataclass(frozen=True)
 class Timeline:
-    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion
-    throughout."""
+    """What a player does and when: spans ordered by start, keys by time. Empty means automatic locomotion."""
 
     spans: tuple[Span, ...] = ()
     keys: tuple[KeyMoment, ...] = ()
@@ -103,8 +102,7 @@ class Timeline:
 def words_per_frame(timeline: Timeline, times: np.ndarray) -> list[frozenset[str] | None]:
     """Per time of `times` (T,) seconds: the words in force, None in a transition, empty where locomotion is automatic.
 
-    A span holds from its start up to, not including, its end; one that ends with the last time holds there too.
-    """
+    A span holds from its start up to, not including, its end; one that ends with the last time holds there too."""
     times = np.asarray(times, dtype=float)
     out: list[frozenset[str] | None] = [frozenset()] * len(times)
     for span in timeline.spans:
@@ -141,9 +139,7 @@ def fill(timeline: Timeline, times: np.ndarray, words: Sequence[tuple[str, ...]]
 
     times: (T,) seconds of the output frames. words: T word tuples, the automatic gait of each frame. Spans with words
     and key moments stay as they are; the others are replaced by one span per stretch of equal automatic words. A
-    stretch runs from its first frame to the next stretch's; the last ends at the last frame, which has no stretch of
-    its own.
-    """
+    stretch runs from its first frame to the next stretch's; the last ends at the last frame."""
     times = np.asarray(times, dtype=float)
     if not len(times):
         return timeline
@@ -172,33 +168,24 @@ def _pieces(start: float, end: float, times: np.ndarray, words: Sequence[tuple[s
 
 
 def problems(
-    timeline: Timeline,
-    known_words: Iterable[str] = (),
-    start: float | None = None,
-    end: float | None = None,
+    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> list[InputError]:
-    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown; `validate`'s
-    list.
+    """Everything that is wrong with a timeline, in time order, as errors ready to be raised or shown.
 
     known_words: words beyond the vocabulary (the library's and the user's). start, end: the track's first and last time
-    in seconds, None where there is no track to compare with. where: the file, for `file:line:` in front of each
-    message.
-    """
+    in seconds, None where there is no track to compare with. where: the file, for messages."""
     known = vocabulary_words(known_words)
     found: list[InputError] = []
     items: list[Span | KeyMoment] = [*timeline.spans, *timeline.keys]
-    for item in sorted(items, key=_first_time):
+    for item in sorted(items, key=lambda item: item.start if isinstance(item, Span) else item.time):
         place = where if item.line is None else f"{where}:{item.line}"
         found += [*_word_problems(item, known, place), *_time_problems(item, start, end, place)]
     return found + _overlaps(timeline, where)
 
 
 def validate(
-    timeline: Timeline,
-    known_words: Iterable[str] = (),
-    start: float | None = None,
-    end: float | None = None,
+    timeline: Timeline, known_words: Iterable[str] = (), start: float | None = None, end: float | None = None,
     where: str = "annotations",
 ) -> None:
     """Raises the first of `problems(...)` as an InputError; returns when there is none."""
@@ -213,15 +200,10 @@ def missing_keys(
     """The key moments that no choice serves, each with the `count` nearest choices.
 
     choices: the words of every clip's key moment, those of mirrored clips included. A choice serves a key moment when
-    it carries all of its words; further words do no harm.
-    """
+    it carries all of its words; further words do no harm."""
     held = [tuple(choice) for choice in choices]
     lacking = [key for key in timeline.keys if not any(set(key.words) <= set(choice) for choice in held)]
     return [(key, nearest(key.words, held, count)) for key in lacking]
-
-
-def _first_time(item: Span | KeyMoment) -> float:
-    return item.start if isinstance(item, Span) else item.time
 
 
 def _word_problems(item: Span | KeyMoment, known: frozenset[str], place: str) -> list[InputError]:
@@ -287,10 +269,8 @@ def _overlaps(timeline: Timeline, where: str) -> list[InputError]:
     pairs += [(a, b, "are at one time") for a, b in zip(keys, keys[1:]) if b.time - a.time <= _SAME_TIME]
     return [
         InputError(
-            where if b.line is None else f"{where}:{b.line}",
-            f"{_named(a)} and {_named(b)} {how}",
-            "one thing at a time",
-            "shorten one of them, or put all words on one line",
+            where if b.line is None else f"{where}:{b.line}", f"{_named(a)} and {_named(b)} {how}",
+            "one thing at a time", "shorten one of them, or put all words on one line",
         )
         for a, b, how in pairs
     ]

@@ -68,9 +68,7 @@ def relatives(word: str) -> frozenset[str]:
 def words_below(words: Iterable[str]) -> tuple[str, ...]:
     """What the tree offers next after `words`, in the tree's order: all children of the deepest places they reach.
 
-    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, outside, top,
-    volley.
-    """
+    A place is reached when every word on its path is among `words`: after ("kick", "low") come inside, top ...."""
     asked = set(words)
     reached = [path for path in _paths(VOCABULARY) if asked.issuperset(path[1:])]
     deepest = max((len(path) for path in reached), default=0)
@@ -99,8 +97,7 @@ def nearest(words: Iterable[str], choices: Iterable[Iterable[str]], count: int =
 
     Ordered by the asked words a choice lacks (one that names the action, like "kick", weighs more than all that only
     colour it), then by how many words it has that stand near the missing ones in the tree (so that "header", where
-    there is none, leads to "jump"), then by words nobody asked for, then in the tree's order.
-    """
+    there is none, leads to "jump"), then by words nobody asked for, then in the tree's order."""
     asked = frozenset(words)
     unique = {frozenset(choice): tuple(choice) for choice in map(tuple, choices)}
     ranked = sorted(unique, key=lambda choice: (*_distance(asked, choice), _in_tree_order(choice)))

@@ -1,5 +1,4 @@
-"""A low-poly soccer player that fits any humanoid skeleton: shirt, shorts, socks, boots, head, hands, with skin
-weights.
+"""A low-poly soccer player that fits any humanoid skeleton: kit, boots, head, hands, with skin weights.
 
 Each part is a closed tube of rings around a bone, built in the neutral stance (`neutral`), where limbs hang and the
 body faces +X, and then carried back into the skeleton's rest pose. Knees, elbows, spine and neck bend smoothly (two
@@ -75,11 +74,9 @@ def _level_head(neutral: Neutral, rest: Neutral) -> Neutral:
 
 
 def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.ndarray) -> np.ndarray:
-    """Vertices (..., V, 3), metres, of the body in poses with joints at `places` (..., J, 3), turned by `world` (...,
-    J, 4).
+    """Vertices (..., V, 3), metres, of the body with joints at `places` (..., J, 3), turned by `world` (..., J, 4).
 
-    Linear blend skinning, as Blender's armature modifier does without volume preservation.
-    """
+    Linear blend skinning, as Blender's armature modifier does without volume preservation."""
     origin = skeleton.rest_positions
     out = np.zeros((*places.shape[:-2], len(body.vertices), 3))
     for column in range(2):
@@ -116,8 +113,7 @@ class _Build:
 
     def tube(self, rings, follows, materials, sides: int = 12, across=((1.0, 0, 0), (0, 1.0, 0))) -> None:
         """A closed tube. rings: rows (centre (3,), radius along the first axis, along the second). follows: per ring
-        (joint, joint, share of the second). materials: one per gap between rings, the first and last also for the
-        caps."""
+        (joint, joint, share of the second). materials: one per gap between rings, the end ones also for the caps."""
         first, second = (np.array(axis, dtype=float) for axis in across)
         angle = 2.0 * np.pi * np.arange(sides) / sides
         circle = np.cos(angle)[:, None, None] * first, np.sin(angle)[:, None, None] * second
@@ -150,8 +146,7 @@ class _Build:
                 self.material.append(material)
 
     def ball(self, centre, radii, joint: int, material: int, other: int | None = None, sides: int = 10) -> None:
-        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half and half with `other` where
-        given."""
+        """A closed ellipsoid with half axes `radii` (3,) that follows `joint`, half with `other` where given."""
         rings = [
             (centre + self.scale * np.array([0, 0, -radii[2] * np.cos(a)]), radii[0] * np.sin(a), radii[1] * np.sin(a))
             for a in np.radians([25, 55, 90, 125, 155])
@@ -180,26 +175,15 @@ class _Build:
         top, half = self._shoulders(hip)
         # share of the way hip joints -> shoulder joints, forward shift, half depth, half width
         shirt = (
-            (0.13, 0.000, 0.112, 0.158),
-            (0.22, 0.002, 0.112, 0.156),
-            (0.36, 0.006, 0.107, 0.146),
-            (0.52, 0.006, 0.112, 0.152),
-            (0.68, 0.004, 0.122, 0.168),
-            (0.82, -0.002, 0.124, 0.178),
-            (0.92, -0.006, 0.114, 0.182),
-            (1.00, -0.010, 0.094, 0.180),
-            (1.055, -0.014, 0.080, 0.150),
-            (1.10, -0.016, 0.070, 0.104),
-            (1.145, -0.016, 0.060, 0.068),
+            (0.13, 0.000, 0.112, 0.158), (0.22, 0.002, 0.112, 0.156), (0.36, 0.006, 0.107, 0.146),
+            (0.52, 0.006, 0.112, 0.152), (0.68, 0.004, 0.122, 0.168), (0.82, -0.002, 0.124, 0.178),
+            (0.92, -0.006, 0.114, 0.182), (1.00, -0.010, 0.094, 0.180), (1.055, -0.014, 0.080, 0.150),
+            (1.10, -0.016, 0.070, 0.104), (1.145, -0.016, 0.060, 0.068),
         )
         self._trunk_rings(hip, top, shirt, SHIRT, half / (0.164 * k))
         shorts = (
-            (-0.17, 0.0, 0.05, 0.06),
-            (-0.14, 0.0, 0.092, 0.118),
-            (-0.06, -0.004, 0.116, 0.158),
-            (0.03, -0.006, 0.122, 0.168),
-            (0.12, -0.002, 0.116, 0.162),
-            (0.205, 0.0, 0.108, 0.152),
+            (-0.17, 0.0, 0.05, 0.06), (-0.14, 0.0, 0.092, 0.118), (-0.06, -0.004, 0.116, 0.158),
+            (0.03, -0.006, 0.122, 0.168), (0.12, -0.002, 0.116, 0.162), (0.205, 0.0, 0.108, 0.152),
         )
         self._trunk_rings(hip, top, shorts, SHORTS, 1.0)
 
@@ -233,9 +217,7 @@ class _Build:
         rings += [(low + share * (base - low), *girth) for share, *girth in ((0.45, 0.056, 0.058), (0.8, 0.054, 0.054))]
         rings += [(base + k * np.array([0.0, 0.0, 0.03]), 0.052, 0.052)]
         self.tube(
-            rings,
-            [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)],
-            [SKIN] * 3,
+            rings, [(body.chest, neck, 0.2), (neck, neck, 0), (neck, carrier, 0.5), (carrier, carrier, 0)], [SKIN] * 3,
             12,
         )
         self._face(base, carrier)
@@ -244,25 +226,14 @@ class _Build:
         k = self.scale
         # above the base of the skull, forward, half depth, half width
         skull = (
-            (-0.072, 0.060, 0.022, 0.022),
-            (-0.062, 0.052, 0.042, 0.038),
-            (-0.038, 0.036, 0.064, 0.054),
-            (-0.005, 0.022, 0.082, 0.066),
-            (0.035, 0.014, 0.094, 0.073),
-            (0.075, 0.010, 0.097, 0.075),
-            (0.110, 0.006, 0.088, 0.068),
-            (0.137, 0.002, 0.062, 0.049),
-            (0.151, 0.000, 0.030, 0.024),
+            (-0.072, 0.060, 0.022, 0.022), (-0.062, 0.052, 0.042, 0.038), (-0.038, 0.036, 0.064, 0.054),
+            (-0.005, 0.022, 0.082, 0.066), (0.035, 0.014, 0.094, 0.073), (0.075, 0.010, 0.097, 0.075),
+            (0.110, 0.006, 0.088, 0.068), (0.137, 0.002, 0.062, 0.049), (0.151, 0.000, 0.030, 0.024),
         )
         hair = (
-            (-0.020, -0.046, 0.040, 0.058),
-            (0.010, -0.030, 0.066, 0.072),
-            (0.050, -0.020, 0.080, 0.079),
-            (0.085, -0.010, 0.090, 0.080),
-            (0.106, 0.002, 0.098, 0.076),
-            (0.128, 0.003, 0.082, 0.064),
-            (0.150, 0.001, 0.054, 0.043),
-            (0.161, -0.002, 0.022, 0.018),
+            (-0.020, -0.046, 0.040, 0.058), (0.010, -0.030, 0.066, 0.072), (0.050, -0.020, 0.080, 0.079),
+            (0.085, -0.010, 0.090, 0.080), (0.106, 0.002, 0.098, 0.076), (0.128, 0.003, 0.082, 0.064),
+            (0.150, 0.001, 0.054, 0.043), (0.161, -0.002, 0.022, 0.018),
         )
         for table, material in ((skull, SKIN), (hair, HAIR)):
             rings = [(base + k * np.array([ahead, 0.0, up]), depth, width) for up, ahead, depth, width in table]
@@ -292,41 +263,26 @@ class _Build:
         inner = -np.sign(self.at(limb.upper_leg)[1])
         bones = limb.upper_leg, limb.lower_leg, limb.foot
         table = (
-            (0.16, 0.004, 0.0, 0.082, 0.076, SKIN),
-            (0.40, 0.006, 0.0, 0.079, 0.073, SKIN),
-            (0.62, 0.005, 0.0, 0.070, 0.065, SKIN),
-            (0.80, 0.002, 0.0, 0.060, 0.058, SKIN),
-            (0.90, 0.004, 0.0, 0.057, 0.055, SKIN),
-            (0.97, 0.006, 0.0, 0.057, 0.053, SKIN),
-            (1.04, 0.004, 0.0, 0.055, 0.051, SKIN),
-            (1.12, -0.002, 0.0, 0.053, 0.050, SKIN),
-            (1.155, -0.004, 0.0, 0.053, 0.051, SKIN),
-            (1.16, -0.006, 0.0, 0.058, 0.056, SOCKS),
-            (1.30, -0.012, 0.004 * inner, 0.061, 0.058, SOCKS),
-            (1.45, -0.010, 0.003 * inner, 0.055, 0.052, SOCKS),
-            (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS),
-            (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS),
-            (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS),
-            (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
+            (0.16, 0.004, 0.0, 0.082, 0.076, SKIN), (0.40, 0.006, 0.0, 0.079, 0.073, SKIN),
+            (0.62, 0.005, 0.0, 0.070, 0.065, SKIN), (0.80, 0.002, 0.0, 0.060, 0.058, SKIN),
+            (0.90, 0.004, 0.0, 0.057, 0.055, SKIN), (0.97, 0.006, 0.0, 0.057, 0.053, SKIN),
+            (1.04, 0.004, 0.0, 0.055, 0.051, SKIN), (1.12, -0.002, 0.0, 0.053, 0.050, SKIN),
+            (1.155, -0.004, 0.0, 0.053, 0.051, SKIN), (1.16, -0.006, 0.0, 0.058, 0.056, SOCKS),
+            (1.30, -0.012, 0.004 * inner, 0.061, 0.058, SOCKS), (1.45, -0.010, 0.003 * inner, 0.055, 0.052, SOCKS),
+            (1.65, -0.004, 0.0, 0.044, 0.041, SOCKS), (1.84, 0.0, 0.0, 0.037, 0.034, SOCKS),
+            (1.96, 0.002, 0.0, 0.038, 0.034, SOCKS), (2.03, 0.002, 0.0, 0.030, 0.026, SOCKS),
         )
         self.limb_tube(*bones, table, 12)
         self.ball(
-            self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]),
-            (0.054, 0.050, 0.056),
-            bones[0],
-            SKIN,
+            self.at(limb.lower_leg) + self.scale * np.array([0.006, 0, 0]), (0.054, 0.050, 0.056), bones[0], SKIN,
             bones[1],
         )
         self.ball(self.at(limb.foot), (0.039, 0.036, 0.042), limb.foot, SOCKS)
         shorts = (
-            (-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS),
-            (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
-            (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS),
-            (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
-            (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS),
-            (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
-            (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS),
-            (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS),
+            (-0.17, 0.0, 0.0, 0.030, 0.030, SHORTS), (-0.13, 0.0, 0.0, 0.075, 0.068, SHORTS),
+            (-0.04, 0.0, 0.0, 0.100, 0.086, SHORTS), (0.10, 0.004, 0.0, 0.104, 0.088, SHORTS),
+            (0.36, 0.006, 0.0, 0.103, 0.093, SHORTS), (0.52, 0.006, 0.0, 0.105, 0.098, SHORTS),
+            (0.525, 0.006, 0.0, 0.088, 0.083, SHORTS), (0.44, 0.006, 0.0, 0.050, 0.050, SHORTS),
         )
         self.limb_tube(*bones, shorts, 12)
 
@@ -338,15 +294,9 @@ class _Build:
         # metres from the ankle (or, from the ball on, from the toe joint), height of the middle, half height, half
         # width
         table = (
-            (-0.068, 0.040, 0.024, 0.018, 0),
-            (-0.060, 0.042, 0.040, 0.030, 0),
-            (-0.030, 0.046, 0.046, 0.036, 0),
-            (0.010, 0.049, 0.049, 0.037, 0),
-            (0.050, 0.040, 0.040, 0.039, 0),
-            (0.090, 0.032, 0.032, 0.043, 0),
-            (0.000, 0.027, 0.027, 0.047, 0.5),
-            (0.028, 0.024, 0.023, 0.045, 1),
-            (0.055, 0.021, 0.018, 0.036, 1),
+            (-0.068, 0.040, 0.024, 0.018, 0), (-0.060, 0.042, 0.040, 0.030, 0), (-0.030, 0.046, 0.046, 0.036, 0),
+            (0.010, 0.049, 0.049, 0.037, 0), (0.050, 0.040, 0.040, 0.039, 0), (0.090, 0.032, 0.032, 0.043, 0),
+            (0.000, 0.027, 0.027, 0.047, 0.5), (0.028, 0.024, 0.023, 0.045, 1), (0.055, 0.021, 0.018, 0.036, 1),
             (0.072, 0.018, 0.011, 0.022, 1),
         )
         rings, follows = [], []
@@ -362,35 +312,23 @@ class _Build:
         inner = -np.sign(self.at(limb.upper_arm)[1])
         bones = limb.upper_arm, limb.lower_arm, limb.hand
         table = (
-            (0.30, 0.0, 0.0, 0.046, 0.044, SKIN),
-            (0.55, 0.003, 0.0, 0.046, 0.043, SKIN),
-            (0.78, 0.002, 0.0, 0.041, 0.039, SKIN),
-            (0.90, 0.0, 0.0, 0.039, 0.038, SKIN),
-            (0.97, -0.002, 0.0, 0.039, 0.038, SKIN),
-            (1.04, -0.001, 0.0, 0.039, 0.038, SKIN),
-            (1.14, 0.003, 0.0, 0.041, 0.039, SKIN),
-            (1.35, 0.003, 0.0, 0.039, 0.036, SKIN),
-            (1.65, 0.001, 0.0, 0.032, 0.028, SKIN),
-            (1.90, 0.0, 0.0, 0.028, 0.022, SKIN),
+            (0.30, 0.0, 0.0, 0.046, 0.044, SKIN), (0.55, 0.003, 0.0, 0.046, 0.043, SKIN),
+            (0.78, 0.002, 0.0, 0.041, 0.039, SKIN), (0.90, 0.0, 0.0, 0.039, 0.038, SKIN),
+            (0.97, -0.002, 0.0, 0.039, 0.038, SKIN), (1.04, -0.001, 0.0, 0.039, 0.038, SKIN),
+            (1.14, 0.003, 0.0, 0.041, 0.039, SKIN), (1.35, 0.003, 0.0, 0.039, 0.036, SKIN),
+            (1.65, 0.001, 0.0, 0.032, 0.028, SKIN), (1.90, 0.0, 0.0, 0.028, 0.022, SKIN),
             (2.04, 0.0, 0.0, 0.026, 0.020, SKIN),
         )
         self.limb_tube(*bones, table, 10)
         self.ball(
-            self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]),
-            (0.038, 0.036, 0.04),
-            bones[0],
-            SKIN,
+            self.at(limb.lower_arm) - self.scale * np.array([0.003, 0, 0]), (0.038, 0.036, 0.04), bones[0], SKIN,
             bones[1],
         )
         sleeve = (
-            (-0.165, 0.0, 0.020 * inner, 0.024, 0.024, SHIRT),
-            (-0.14, 0.0, 0.016 * inner, 0.044, 0.042, SHIRT),
-            (-0.07, 0.0, 0.008 * inner, 0.060, 0.056, SHIRT),
-            (0.06, 0.0, 0.0, 0.067, 0.060, SHIRT),
-            (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT),
-            (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
-            (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT),
-            (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT),
+            (-0.165, 0.0, 0.020 * inner, 0.024, 0.024, SHIRT), (-0.14, 0.0, 0.016 * inner, 0.044, 0.042, SHIRT),
+            (-0.07, 0.0, 0.008 * inner, 0.060, 0.056, SHIRT), (0.06, 0.0, 0.0, 0.067, 0.060, SHIRT),
+            (0.30, 0.0, 0.0, 0.065, 0.059, SHIRT), (0.56, 0.0, 0.0, 0.066, 0.062, SHIRT),
+            (0.565, 0.0, 0.0, 0.054, 0.052, SHIRT), (0.48, 0.0, 0.0, 0.030, 0.030, SHIRT),
         )
         self.limb_tube(*bones, sleeve, 12)
 
@@ -398,13 +336,9 @@ class _Build:
         wrist, k, joint = self.at(limb.hand), self.scale, limb.hand
         # below the wrist, towards the palm, forward, half length along the palm's width, half thickness
         table = (
-            (-0.022, 0.0, 0.0, 0.024, 0.019),
-            (0.010, 0.0, 0.0, 0.031, 0.018),
-            (0.050, 0.002, 0.002, 0.042, 0.019),
-            (0.092, 0.008, 0.002, 0.043, 0.018),
-            (0.124, 0.020, 0.000, 0.038, 0.017),
-            (0.148, 0.038, -0.002, 0.033, 0.015),
-            (0.156, 0.058, -0.002, 0.027, 0.012),
+            (-0.022, 0.0, 0.0, 0.024, 0.019), (0.010, 0.0, 0.0, 0.031, 0.018), (0.050, 0.002, 0.002, 0.042, 0.019),
+            (0.092, 0.008, 0.002, 0.043, 0.018), (0.124, 0.020, 0.000, 0.038, 0.017),
+            (0.148, 0.038, -0.002, 0.033, 0.015), (0.156, 0.058, -0.002, 0.027, 0.012),
         )
         rings = [
             (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)
@@ -412,10 +346,8 @@ class _Build:
         ]
         self.tube(rings, [(joint, joint, 0.0)] * len(rings), [SKIN] * (len(rings) - 1), 10)
         thumb = (
-            (0.030, 0.004, 0.026, 0.016, 0.014),
-            (0.058, 0.012, 0.046, 0.014, 0.013),
-            (0.084, 0.022, 0.054, 0.011, 0.011),
-            (0.096, 0.026, 0.055, 0.006, 0.006),
+            (0.030, 0.004, 0.026, 0.016, 0.014), (0.058, 0.012, 0.046, 0.014, 0.013),
+            (0.084, 0.022, 0.054, 0.011, 0.011), (0.096, 0.026, 0.055, 0.006, 0.006),
         )
         rings = [
             (wrist + k * np.array([ahead, -side * palm, -down]), wide, thick)

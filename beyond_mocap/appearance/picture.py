@@ -1,7 +1,6 @@
 """A small picture of one pose: the low-poly body on transparent ground, drawn with numpy alone.
 
-Faces are filled from far to near, at twice the size, and averaged down: no window, no graphics card, the same pixels
-everywhere.
+Faces are filled from far to near, at twice the size, and averaged down: no graphics card, the same pixels everywhere.
 """
 
 from __future__ import annotations
@@ -54,8 +53,7 @@ def _camera() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
     """The shadow of faces that look at the sun, then the faces that look at the camera, the far ones first.
 
-    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows.
-    """
+    flat: (2 V, 2) pixels of the skin's V vertices, then of their shadows."""
     corners = skin[quads]
     normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
     normal = unit_vectors(normal, least=1e-12)
@@ -71,8 +69,7 @@ def _draw_faces(canvas, skin, flat, quads, material, away) -> None:
 
 
 def _fill(canvas: np.ndarray, corners: np.ndarray, colours: np.ndarray) -> None:
-    """Convex polygons (F, 4, 2) pixels, whichever way round, one after the other; colours (F, 4) take the place of what
-    was there."""
+    """Convex polygons (F, 4, 2) pixels, one after the other; colours (F, 4) take the place of what was there."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, len(canvas))
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, len(canvas))
     onward = np.roll(corners, -1, axis=1) - corners

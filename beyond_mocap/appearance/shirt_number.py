@@ -19,8 +19,7 @@ _MIDDLE = {"back": 0.70, "chest": 0.74}  # share of the shirt's height, from its
 
 @dataclass(frozen=True, eq=False)
 class OnShirt:
-    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) metres, joints (N, 6) and weights (N, 6) that sum
-    to 1."""
+    """Points on a shirt, in the skeleton's rest pose: vertices (N, 3) m, joints (N, 6), weights (N, 6), in sum 1."""
 
     vertices: np.ndarray
     joints: np.ndarray
@@ -34,8 +33,7 @@ def on_shirt(
     "back" or "chest", of a person who stands.
 
     body: of `low_poly_body` with the same `example`. Each point takes place and weights of the triangle of cloth behind
-    it, so it stays on the shirt in every pose. Points beside the shirt are put on its edge. InputError where the body
-    has no shirt.
+    it, so it stays on the shirt in every pose; points beside it are put on its edge. InputError for a body without one.
     """
     neutral = neutral_stance(skeleton, example)
     standing = deformed(body, skeleton, neutral.positions, neutral.rotations)
@@ -65,18 +63,13 @@ def _cloth(body: BodyMesh, standing: np.ndarray, outward: float) -> np.ndarray:
     edges = standing[triangles[:, 1:]] - standing[triangles[:, :1]]
     normal = np.cross(edges[:, 0], edges[:, 1])
     size = np.linalg.norm(normal, axis=1)
-    trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[_widest(standing, triangles)], 0]))
+    middle = np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1  # near the middle plane: those are no sleeves
+    trunk = np.isin(body.joints[triangles[:, 0], 0], np.unique(body.joints[triangles[middle], 0]))
     return triangles[trunk & (outward * normal[:, 0] > 0.2 * size) & (size > 1e-9)]
 
 
-def _widest(standing: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(K,) bool: triangles near the middle plane: those are no sleeves."""
-    return np.abs(standing[triangles][..., 1]).max(axis=1) < 0.1
-
-
 def _behind(flat: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or comes nearest to it, and barycentric shares
-    (N, 3)."""
+    """For points (N, 2) the triangle of (K, 3, 2) that holds each, or is nearest, and barycentric shares (N, 3)."""
     origin, first, second = flat[:, 0], flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
     area = cross_level(first, second)
     away = points[:, None] - origin

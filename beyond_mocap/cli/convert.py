@@ -1,4 +1,4 @@
-"""The verbs `mirror` and `retarget`."""
+"""The verbs `mirror`, `retarget` and `stream`: one recording exchanged left for right, on other bones, or sent."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Writer, check_outputs
-from .progress_reporter import Told
+from .outputs import Told, Writer, check_outputs, naming
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
@@ -39,14 +38,10 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
 
     check_outputs(options.output)
     clip = bvh.read(options.input, options.unit)
-    try:
+    with naming(options.input):
         twin = mirror(clip.motion)
-    except InputError as error:  # about a skeleton, which does not know its file
-        raise InputError(options.input, str(error)) from None
     bvh.write(options.output, twin, clip.form)
-    told.end()
-    for note in clip.notes:
-        told.note(note)
+    told.end(clip.notes)
     print(f"{options.output}: {len(clip.motion)} frames")
 
 
@@ -64,8 +59,32 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
             raise
         raise InputError(f"{options.input} to {options.to}", str(error)) from None  # skeletons do not know their files
     notes = bvh.write(options.out, motion, target.form)
-    told.end()
-    told_of = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
-    for path, note in told_of:
-        told.note(f"{path}: {note}")
+    lines = [(options.input, clip.notes[0]), (options.to, target.notes[0]), *((options.out, note) for note in notes)]
+    told.end(f"{path}: {note}" for path, note in lines)
     print(f"{options.out}: {len(motion)} frames")
+
+
+def add_stream(verbs):
+    verb = verbs.add_parser("stream", help="send a recording as a motion capture suit does, on this machine only")
+    verb.add_argument("clip", type=Path, metavar="CLIP.bvh")
+    add_options(verb, "stream")
+    add_options(verb.add_mutually_exclusive_group(), "stream.way")
+    add_options(verb, "stream.send")
+    verb.set_defaults(run=run_stream)
+    return verb
+
+
+def run_stream(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`stream`: sends until the recording's end."""
+    from ..passes.stream.sender import Sender
+
+    way = "tcp" if options.tcp else "serve" if options.serve else "udp"
+    sender = Sender(options.clip, options.port, way, form=options.form, rate=options.fps, loop=options.loop)
+    where = f"port {options.port} of this machine ({way.upper()}, {options.form})"
+    print(f"sending {options.clip.name} to {where}", flush=True)
+    count = len(sender.rows)
+    sent = sender.run(told.cancelled, lambda frame: told.progress((frame - 1) % count / count, "Sending"))
+    told.end()
+    print(f"{sent} frames sent")
+    if not options.loop:
+        told.check()

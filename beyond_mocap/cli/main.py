@@ -1,8 +1,7 @@
 """The command line: `python -m beyond_mocap VERB ...`; Blender's command and batch script use the same parser.
 
 Exit status: 0 done; 2 the command line or an input is wrong; 3 asked for something the library cannot do; 130
-cancelled.
-What is wrong is told in one line on stderr. See the project's README for examples.
+cancelled. What is wrong stands in one line on stderr. See the project's README for examples.
 """
 
 from __future__ import annotations
@@ -16,16 +15,22 @@ from collections.abc import Callable, Mapping
 
 from .. import __version__
 from ..base.errors import BeyondMocapError, Cancelled, InputError
-from . import matching, passing, reconstructing, releasing, ride_path, stream, study, throwing, touches
-from .convert import add_mirror, add_retarget
-from .evaluate import add_evaluate
+from .convert import add_mirror, add_retarget, add_stream
 from .library import add_library
-from .outputs import Writer
-from .progress_reporter import Told
-from .synthesize import add_synthesize
+from .matching import add_match, add_touches
+from .outputs import Told, Writer
+from .passing import add_passes
+from .reconstructing import add_reconstruct, add_release
+from .ride_path import add_path
+from .study import add_study
+from .synthesize import add_evaluate, add_synthesize
+from .throwing import add_throw
 
+VERBS = (add_library, add_synthesize, add_path, add_touches, add_stream, add_passes, add_reconstruct, add_release,
+         add_throw, add_match, add_study, add_mirror, add_retarget, add_evaluate)  # fmt: skip
+"""What adds a verb, in the order of `--help`; each gets the sub-parsers and returns its parser."""
 Apart = Callable[[list[str], Callable[[float, str], None], Callable[[], bool]], object]
-"""Runs arguments, tells its progress, and is asked whether somebody wants out."""
+"""Runs arguments, reports its progress, and is asked whether to stop."""
 
 
 class OneLineParser(argparse.ArgumentParser):
@@ -45,11 +50,8 @@ def parser(prog: str = "beyond-mocap") -> argparse.ArgumentParser:
     top = OneLineParser(prog=prog, description="From tracks, a few words and motion capture to moving bodies.")
     top.add_argument("--version", action="version", version=f"beyond-mocap {__version__}")
     verbs = top.add_subparsers(dest="verb", required=True, metavar="VERB", parser_class=OneLineParser)
-    own = (ride_path.add, touches.add, stream.add, passing.add, reconstructing.add, releasing.add,
-           throwing.add, matching.add, study.add)
-    for add in (add_library, add_synthesize, *own, add_mirror, add_retarget, add_evaluate):
-        verb = add(verbs)
-        verb.add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
+    for add in VERBS:
+        add(verbs).add_argument("--json", action="store_true", help="progress as JSON lines on stderr")
     return top
 
 
@@ -60,8 +62,7 @@ def main(
     """Runs one command and returns its exit status.
 
     writers: by suffix, further kinds of `--out` (Blender's). apart: runs a command line in a process of its own, where
-    this one cannot send work to others, as within Blender.
-    """
+    this one cannot send work to others, as within Blender."""
     told = None
     _escape(sys.stdout)
     try:
@@ -88,8 +89,7 @@ def main(
 
 
 def _escape(stream) -> None:
-    """Lets a stream write what its encoding lacks as escapes, where it would raise: names of files and people on a
-    console of another script."""
+    """Lets a stream write what its encoding lacks as escapes instead of raising: names on a foreign console."""
     if getattr(stream, "errors", None) == "strict" and hasattr(stream, "reconfigure"):
         stream.reconfigure(errors="backslashreplace")
 

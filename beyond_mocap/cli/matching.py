@@ -1,20 +1,24 @@
-"""The verb `match`: many players and the ball, from a provider's files."""
+"""The verbs `match` and `touches`: all players' motion, or who touched the ball when, from a provider's tracking."""
 
 from __future__ import annotations
 
 import os
+import time
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from ..base.errors import BeyondMocapError, InputError
+import numpy as np
+
+from .. import __version__
+from ..base.errors import BeyondMocapError, InputError, told_time
 from ..base.settings.options import add_options, option_values
-from .outputs import Writer, check_outputs, named_folder
-from .progress_reporter import Told
+from .outputs import Told, Writer, check_outputs, named_folder
 
 
-def add(verbs):
-    """The verb's parser."""
-    from ..files.events.event_providers import EVENT_PROVIDERS
+def add_match(verbs):
+    from ..files.event_providers import EVENT_PROVIDERS
     from ..files.tracking.providers import PROVIDERS
 
     verb = verbs.add_parser("match", help="everybody's motion and the ball of a tracked match, resumable")
@@ -27,19 +31,18 @@ def add(verbs):
     verb.add_argument("--provider", metavar="NAME", default="",
                       help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed")
     verb.add_argument("--library", type=Path, required=True)
-    verb.add_argument(
-        "--out", type=named_folder, required=True, metavar="FOLDER", help="is made; goes on where it was left"
-    )
+    verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER",
+                      help="is made; goes on where it was left")
     add_options(verb, "match.section")
     add_options(verb.add_mutually_exclusive_group(), "match.work")
     add_options(verb, "match")
     verb.add_argument("--nearest", action="store_true", help="go on with the nearest words; the default")
     add_options(verb, "library")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_match)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_match(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`match`: makes what is not there yet, and tells what came of it."""
     from ..match.make import make_match, result_of
     from ..match.order import MatchOrder
@@ -56,9 +59,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     else:
         options.apart(without(options.argv, "--scene"), told.progress, told.cancelled)
         made = result_of(order)
-    told.end()
-    for line in made.notes:
-        told.note(line)
+    told.end(made.notes)
     for player in made.failed:
         told.note(f"player {player.id} was left out: {player.reason}")
     if not made.done:
@@ -82,8 +83,7 @@ def scene_writer(scene: Path, writers: Mapping[str, Writer]) -> Writer:
 
 
 def without(arguments: Sequence[str], option: str) -> list[str]:
-    """A command line without a long option of one value, whichever way it is written: shortened too, as argparse takes
-    it."""
+    """A command line without a long option of one value, however it is written: shortened too, as argparse takes it."""
     kept, rest = [], iter(arguments)
     for one in rest:
         name, equals, _ = one.partition("=")
@@ -97,3 +97,81 @@ def without(arguments: Sequence[str], option: str) -> list[str]:
 def _cores() -> range | set[int]:
     """The cores that this process may use."""
     return os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else range(os.cpu_count() or 1)
+
+
+def add_touches(verbs):
+    from ..files.tracking.providers import PROVIDERS
+
+    verb = verbs.add_parser("touches", help="who touched the ball and when, from tracking")
+    verb.add_argument("input", type=Path, metavar="FILE", help="a provider's tracking, or one player's track as CSV")
+    verb.add_argument("--meta", type=Path, metavar="FILE", help="the provider's metadata; default: looked for beside")
+    verb.add_argument("--provider", metavar="NAME",
+                      help=f"whose form FILE has: {', '.join(PROVIDERS)}; default: guessed from its content")
+    add_options(verb, "touches")
+    verb.add_argument("--out", type=Path, required=True, metavar="TOUCHES.csv")
+    verb.add_argument("--ball", type=Path, metavar="BALL.csv", help="the solved path at the times of the samples")
+    verb.add_argument("--report", type=Path, metavar="R.json")
+    verb.set_defaults(run=run_touches)
+    return verb
+
+
+def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`touches`: solves the ball and writes what was asked for."""
+    from ..ball.solve_ball import solve_ball
+    from ..files.tables import write_ball, write_report, write_touches
+    from ..motion.track.ball_path import BallPath
+
+    begun = time.perf_counter()
+    check_outputs(options.out, options.ball, options.report, never=(options.input, options.meta))
+    if options.start is not None and options.end is not None and options.end <= options.start:
+        raise InputError("--to", f"{told_time(options.end)} s", f"later than --from {told_time(options.start)} s")
+    source = _read_tracking(options)
+    loaded = time.perf_counter()
+    solved = solve_ball(source, told.progress, told.cancelled, options.start, options.end)
+    done = time.perf_counter()
+    write_touches(options.out, solved.touches)
+    if options.ball:
+        write_ball(options.ball, BallPath(solved.times, solved.ball.at(solved.times), solved.measured))
+    if options.report:
+        seconds = {"load": loaded - begun, "solve": done - loaded}
+        write_report(options.report, {**_report_touches(solved), "seconds": seconds})
+    told.end(f"{options.input}: {note}" for note in solved.notes)
+    print(f"{options.out}: {len(solved.touches)} touches in {solved.times[-1] - solved.times[0]:.1f} s")
+
+
+def _read_tracking(options):
+    """The match, or the track where the file is the contract's own table."""
+    from ..files.tracking.tracking import read_match, read_track_csv
+
+    if options.input.is_file() and not options.provider:
+        with open(options.input, "rb") as file:
+            if b"time_s" in file.readline(4096):
+                if options.meta:
+                    found = f"{options.meta} beside a player's track"
+                    raise InputError("--meta", found, "none: a track has no metadata")
+                return replace(read_track_csv(options.input), name=options.input.stem)  # who touches, in the table
+    return read_match(options.input, options.meta, options.provider)
+
+
+def _report_touches(solved) -> dict:
+    """The figures of a `SolvedBall`, for JSON."""
+    off = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
+    spread = [touch.uncertainty for touch in solved.touches]
+    return {
+        "version": __version__, "samples": len(solved.times), "touches": len(solved.touches),
+        "kinds": dict(Counter(touch.kind for touch in solved.touches)),
+        "parts": dict(Counter(touch.part for touch in solved.touches)),
+        "players": dict(Counter(touch.player for touch in solved.touches)),
+        "filled_share": solved.filled.mean(), "outliers": int(np.count_nonzero(solved.outlier)),
+        "measured_share": solved.measured.mean(),
+        "residual_m": _percentiles(off), "uncertainty_s": _percentiles(np.array(spread)),
+        "confidence": solved.confidence,
+        "pieces": dict(Counter(piece.kind for piece in solved.pieces)),
+        "ends": [vars(end) for end in solved.ends], "notes": list(solved.notes),
+    }  # fmt: skip
+
+
+def _percentiles(values: np.ndarray) -> dict | None:
+    if not len(values):
+        return None
+    return {"median": np.median(values), "p95": np.percentile(values, 95), "max": values.max()}

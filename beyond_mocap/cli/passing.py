@@ -12,23 +12,21 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Writer, named_folder
-from .progress_reporter import Told
+from .outputs import Told, Writer, named_folder, naming
 
 
-def add(verbs):
-    """The verb's parser."""
+def add_passes(verbs):
     verb = verbs.add_parser("passes", help="several players keep a ball going")
     verb.add_argument("scene", type=Path, metavar="SCENE.json",
                       help="who passes to whom; docs/passes/passes.md has its form")
     verb.add_argument("--library", type=Path, required=True, help="a folder of clips with strikes of the ball")
     verb.add_argument("--out", type=named_folder, required=True, metavar="FOLDER", help="is made where there is none")
     add_options(verb, "library")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_passes)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_passes(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`passes`: plays the scene and writes its players, its ball and what came of it."""
     from ..library.build import build
     from ..passes.passes import ball_of, passes
@@ -37,23 +35,21 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     begun = time.perf_counter()
     _check_folder(options.out)
     scene = read_scene(options.scene)
-    with _naming(options.scene):
+    with naming(options.scene):
         ball_of(scene)
     library = build(
         options.library, cache_dir=options.cache, skeleton=options.skeleton, unit=options.unit,
         progress=lambda share, text: told.progress(0.3 * share, text), cancelled=told.cancelled,
     )
     loaded = time.perf_counter()
-    with _naming(options.scene):
+    with naming(options.scene):
         played = passes(library, scene, lambda share, text: told.progress(0.3 + 0.65 * share, text), told.cancelled)
     done = time.perf_counter()
     told.check()
     table = strikes(library, played)
     report = {**_report(played, table), "seconds": {"load": loaded - begun, "play": done - loaded}}
     _write(options.out, played, table, report)
-    told.end()
-    for line in played.warnings:
-        told.note(f"{options.scene}: {line}")
+    told.end(f"{options.scene}: {line}" for line in played.warnings)
     names = {player.name for player in played.players}
     others = sorted(path.stem for path in options.out.glob("*.bvh") if path.stem not in names)
     if others:
@@ -61,20 +57,6 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     gaps = [row["contact_gap_m"] for row in table if row["outcome"] != "missed"]
     print(f"{options.out}: {len(played.players)} players, {len(table)} strikes in {played.plan.seconds:.1f} s, "
           f"widest gap {1000.0 * max(gaps, default=0.0):.1f} mm")  # fmt: skip
-
-
-class _naming:
-    """What is wrong with a scene is told with its file."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, kind, error, trace):
-        if isinstance(error, InputError) and not error.where.startswith(str(self._path)):
-            raise InputError(self._path, str(error)) from None
 
 
 def _check_folder(folder: Path) -> None:

@@ -1,25 +1,26 @@
-"""The verb `reconstruct`: optical markers become a moving skeleton, of one trial or of a folder of them."""
+"""The verbs `reconstruct` and `release`: optical markers of a trial, or of a folder of them, become a moving skeleton;
+when and how a ball left its hand."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from .. import __version__
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Writer, check_outputs, writer_of
-from .progress_reporter import Told
+from .outputs import Told, Writer, build_take, check_outputs, writer_of
 
 _MOST_LINES = 12
 
 
-def add(verbs):
-    """The verb's parser."""
+def add_reconstruct(verbs):
     verb = verbs.add_parser("reconstruct", help="optical markers (.c3d, .trc) become a moving skeleton")
     verb.add_argument("trial", type=Path, metavar="TRIAL", help="a recording of markers, or a folder of them")
     verb.add_argument("--static", type=Path, metavar="STATIC", help="the same markers on the same standing body")
@@ -28,13 +29,13 @@ def add(verbs):
     verb.add_argument("--report", type=Path, metavar="R.json")
     verb.add_argument("--save-model", type=Path, metavar="MODEL.json")
     add_options(verb, "markers")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_reconstruct)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_reconstruct(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`reconstruct`: of one trial, or of all in a folder."""
-    from ..library.add_clip import plain_words
+    from ..library.keep_words import plain_words
 
     if options.model and options.static:
         raise InputError("--model", "with --static", "one of them", "leave one out")
@@ -57,13 +58,13 @@ def _run_one(options, told: Told, writers: Mapping[str, Writer]) -> None:
     check_outputs(options.out, options.report, options.save_model, never=inputs)
     write = writer_of(options.out, writers)
     if options.add_to:
-        from ..library.add_clip import free_place
+        from ..library.keep_words import free_place
 
         check_outputs(options.out, free_place(options.add_to, options.trial.stem))
     settings = settings_of(options)
     trial = read_trial(options.trial, options)
     static = None if options.static is None else read_trial(options.static, options)
-    model = None if options.model is None else _model(options.model)
+    model = _read_chosen_model(options)
     loaded = time.perf_counter()
     try:
         made = reconstruct(trial, static, model, settings=settings, progress=told.progress, cancelled=told.cancelled)
@@ -118,7 +119,7 @@ def _run_folder(options, told: Told) -> None:
         raise InputError(options.add_to, "is not a folder", "a library's folder", "make the folder first")
     recordings_of(options.trial)  # there are some
     settings = settings_of(options)
-    model = None if options.model is None else _model(options.model)
+    model = _read_chosen_model(options)
     _check_folder(options.out, options.trial)
     read = partial(read_trial, options=options)
     rows = []
@@ -201,10 +202,11 @@ def read_trial(path: Path, options):
     return replace(trial, fps=options.fps) if options.fps else trial
 
 
-def _model(path: Path):
+def _read_chosen_model(options):
+    """The model of `--model`, None without one."""
     from ..markers.files.model_json import read_model
 
-    return read_model(path)
+    return None if options.model is None else read_model(options.model)
 
 
 def _with_file(error: InputError, options) -> InputError:
@@ -217,21 +219,13 @@ def _with_file(error: InputError, options) -> InputError:
 
 def as_take(made):
     """The reconstruction as a take, for those who write takes: Blender's formats too."""
-    from ..annotation import Timeline
-    from ..motion.contacts import points
-    from ..synthesis.take import Take
+    from ..motion.contacts import detect
 
-    count = len(made.motion)
-    try:
-        contacts = points(made.motion).all(axis=2)
-    except InputError:  # no legs
-        contacts = np.zeros((count, 2), bool)
-    return Take(
-        motion=made.motion, start_time=made.trial.start, clips=(made.raw.name,), clip=np.zeros(count, int),
-        clip_frame=np.arange(count, dtype=float), mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=contacts, seams=np.zeros(0, int), timeline=Timeline(), keys=(),
-        ball=None if made.release is None else made.release.path, method="reconstruct", seed=0, warnings=made.warnings,
-    )  # fmt: skip
+    known = {} if made.release is None else {"ball": made.release.path}
+    with suppress(InputError):  # no legs
+        known["contacts"] = detect(made.motion)
+    return build_take(made.motion, made.raw.name, "reconstruct", start_time=made.trial.start, warnings=made.warnings,
+                      **known)
 
 
 def summary(made) -> str:
@@ -247,9 +241,51 @@ def _is_throw(words) -> bool:
 
 def add_to_library(made, name: str, options) -> list[str]:
     """The motion as a clip of a library, a throw's words at its release; notes for people."""
-    from ..library.add_clip import add_clip
+    from ..library.keep_words import add_clip
 
     key = None
     if _is_throw(options.words) and made.release is not None:
         key = made.release.frame / made.motion.fps
     return add_clip(options.add_to, name, made.on_floor(), options.words, key)
+
+
+def add_release(verbs):
+    verb = verbs.add_parser("release", help="when and how a ball left the hand of a recorded throw")
+    verb.add_argument("trial", type=Path, metavar="TRIAL", help="markers, .c3d or .trc")
+    verb.add_argument("--motion", type=Path, required=True, metavar="M.bvh", help="the motion made from this trial")
+    verb.add_argument("--report", type=Path, required=True, metavar="R.json")
+    add_options(verb, "release")
+    verb.set_defaults(run=run_release)
+    return verb
+
+
+def run_release(options, told: Told, writers: Mapping[str, Writer]) -> None:
+    """`release`: finds the release and writes what was asked for."""
+    from ..files.bvh import bvh
+    from ..files.tables import write_ball, write_report
+    from ..markers.files.marker_files import read_markers
+    from ..markers.release.release import ReleaseSettings, release
+
+    begun = time.perf_counter()
+    check_outputs(options.report, options.ball_csv, never=(options.trial, options.motion))
+    trial = read_markers(options.trial, options.unit, options.subject, options.up)
+    motion = bvh.read(options.motion).motion
+    loaded = time.perf_counter()
+    settings = ReleaseSettings(**option_values(ReleaseSettings, options, "release"))
+    try:
+        found = release(trial, motion, settings)
+    except InputError as error:  # trials know only the file's name
+        raise error if error.where != trial.name else InputError(options.trial, str(error).split(": ", 1)[1]) from None
+    done = time.perf_counter()
+    report = {"version": __version__, "trial": str(options.trial), **found.report()}
+    write_report(options.report, {**report, "seconds": {"load": loaded - begun, "release": done - loaded}})
+    if options.ball_csv:
+        write_ball(options.ball_csv, found.path)
+    told.end(f"{options.trial}: {note}" for note in found.notes)
+    radar = ""
+    if found.radar is not None:
+        radar = f", radar {found.radar:.1f} m/s ({100 * (found.speed / found.radar - 1):+.1f} %)"
+    print(
+        f"{options.report}: {found.side} hand, released at {found.time:.3f} s (frame {found.frame}, +-"
+        f"{1000 * found.time_sigma:.0f} ms), {found.speed:.1f} +- {found.speed_sigma:.1f} m/s{radar}"
+    )

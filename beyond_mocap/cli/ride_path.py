@@ -1,35 +1,41 @@
-"""The verb `path`: a recording rides another path."""
+"""The verb `path`: a recording rides another path, and keeps clear of bodies that are already moving: it waits a little
+or goes round, as little as it takes."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options, option_values
-from .outputs import Writer, check_outputs, writer_of
-from .progress_reporter import Told
+from .outputs import Told, Writer, build_take, check_outputs, naming, writer_of
+
+if TYPE_CHECKING:
+    from ..path_editing.follower import Change, Follower
+    from ..path_editing.ride import Ridden, RideSettings, RideSource
 
 _WHOLE = 0.95  # of a path, that is as good as all of it
+_ROUNDS = 3  # of looking for delays and detours
+_HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
 
 
-def add(verbs):
-    """The verb's parser."""
+def add_path(verbs):
     verb = verbs.add_parser("path", help="a recording rides another path")
     verb.add_argument("input", type=Path, metavar="IN.bvh")
     verb.add_argument("--path", type=Path, required=True, metavar="CURVE.csv", help="x_m,y_m[,z_m]: the new path")
     verb.add_argument("--out", type=Path, required=True, metavar="OUT.bvh")
     # Blender's own Cycles add-on reads what stands behind `--` (batch.py) and ends Blender over `--cycle`: hence --loop
     add_options(verb, "path_editing")
-    verb.set_defaults(run=run)
+    verb.set_defaults(run=run_path)
     return verb
 
 
-def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
+def run_path(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`path`: rides it, and writes what was asked for about it."""
     from ..files.bvh import bvh
 
@@ -64,9 +70,7 @@ def run(options, told: Told, writers: Mapping[str, Writer]) -> None:
     else:
         write(take, options.out)
     _write_tables(options, take, report)
-    told.end()
-    for note in (*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)):
-        told.note(note)
+    told.end((*notes, *asked, *ridden.warnings, *_left_over(source, ridden, path, options)))
     gone = float(np.maximum(np.diff(ridden.arc), 0.0).sum())  # where it begins anew it is set back
     print(f"{options.out}: {len(ridden.motion)} frames, {ridden.motion.duration:.1f} s, {gone:.1f} "
           f"m{_unit(clip, options)}")
@@ -104,14 +108,10 @@ def _path(options):
     from ..path_editing.path_csv import read_curve
 
     points = read_curve(options.path)
-    try:
+    with naming(options.path):
         if options.control_points:
             return path_line.b_spline(points, options.control_degree or 3)
         return path_line.through(points, str(options.path), closed=options.closed)
-    except InputError as error:
-        if error.where.startswith(str(options.path)):
-            raise
-        raise InputError(options.path, str(error)) from None  # points do not know their file
 
 
 def _ground(options):
@@ -131,10 +131,8 @@ def _prepared(motion, options):
     settings = RideSettings(
         fit="polynomial" if options.degree else "spline", **option_values(RideSettings, options, "path_editing")
     )
-    try:
+    with naming(options.input):
         return prepare(motion, settings), settings
-    except InputError as error:
-        raise InputError(options.input, str(error)) from None  # a motion does not know its file
 
 
 def _apart(source, path, settings, ground, options):
@@ -142,38 +140,23 @@ def _apart(source, path, settings, ground, options):
     if not options.avoid:
         return settings, ()
     from ..path_editing.collisions import DISTANCE
-    from .keep_apart import clear_of, read_others
 
-    others = read_others(options.avoid)
-    with _naming_files(options):
-        return clear_of(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
-                        name=options.input.name)
-
-
-@contextmanager
-def _naming_files(options):
-    """A ride does not know its files: errors are told with them."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{options.input} on {options.path}", str(error)) from None
+    others = _read_others(options.avoid)
+    with naming(f"{options.input} on {options.path}"):
+        return _keep_clear(others, options.distance or DISTANCE, source, path=path, settings=settings, ground=ground,
+                           name=options.input.name)
 
 
 def _ridden(source, path, settings, ground, options):
     """What was ridden, and the same as a take."""
-    from ..annotation import Timeline
     from ..path_editing.path_ride import carried
     from ..path_editing.ride import ride
-    from ..synthesis.take import Take
 
-    with _naming_files(options):
+    with naming(f"{options.input} on {options.path}"):
         ridden = ride(source, path, settings, ground)
-    count = len(ridden.motion)
-    take = Take(
-        motion=ridden.motion, start_time=0.0, clips=(options.input.name,), clip=np.zeros(count, int),
-        clip_frame=ridden.frames, mirrored=np.zeros(count, bool), words=((),) * count,
-        contacts=carried(ridden).all(axis=2), seams=np.asarray(ridden.seams, int), timeline=Timeline(), keys=(),
-        ball=None, method="ride", seed=0, warnings=tuple(ridden.warnings), correction=ridden.correction,
+    take = build_take(
+        ridden.motion, options.input.name, "ride", clip_frame=ridden.frames, contacts=carried(ridden).all(axis=2),
+        seams=np.asarray(ridden.seams, int), warnings=tuple(ridden.warnings), correction=ridden.correction,
         ik_miss=ridden.miss,
     )  # fmt: skip
     return ridden, take
@@ -193,3 +176,67 @@ def _report(source, ridden, take, path, ground) -> dict:
     seams = {name: ridden_well["seam_jerk"][name] for name in ("median", "max")}
     report["seam_jerk_ratio"] = {**report.get("seam_jerk_ratio", {}), **seams}
     return {**report, "root_error_m": ridden_well["root_error_m"], "path": ridden_well, "warnings": list(take.warnings)}
+
+
+def _read_others(paths: Sequence[Path]) -> list[Follower]:
+    """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
+    from ..files.bvh import bvh
+    from ..path_editing.follower import Follower
+
+    motions = [(path.name, bvh.read(path).motion) for path in paths]
+    return [
+        Follower(name=name, times=np.arange(len(motion)) / motion.fps, places=motion.root_positions - (0.0, 0.0, _HIPS))
+        for name, motion in motions
+    ]
+
+
+def _keep_clear(
+    others: list[Follower], distance: float, source: RideSource, path, settings: RideSettings, ground, name: str
+) -> tuple[RideSettings, tuple[str, ...]]:
+    """`settings` with the delay and the detours that keep the rider `distance` metres from `others`; what was asked of
+    it and what could not be resolved, one line each. name: of the rider, for the lines."""
+    from ..path_editing.apart import Limits, resolved
+    from ..path_editing.ride import ride
+
+    bare, limits = ride(source, path, replace(settings, plant=False), ground), Limits(distance)
+    me = replace(_build_follower(name, bare), path=path, arc=bare.arc, by_arc=settings.by_arc_length)
+    for _ in range(_ROUNDS):
+        change = resolved([me, *others], limits).changes[0]
+        asked = _apply_change(settings, change, bare.motion.fps)
+        rider = _build_follower(name, ride(source, path, replace(asked, plant=False), ground))
+        left = _find_collisions([rider, *others], distance)
+        if not left:
+            break
+        limits = replace(limits, distance=limits.distance + distance - min(hit.gap for hit in left) + 0.01)
+    still = (f"still comes within {hit.gap:.2f} m of {others[hit.second - 1].name} at {hit.time:.1f} s" for hit in left)
+    return asked, tuple(f"{name} {line}" for line in (*_describe_changes(asked, settings), *still))
+
+
+def _build_follower(name: str, ridden: Ridden) -> Follower:
+    from ..path_editing.follower import Follower
+
+    times = np.arange(len(ridden.motion)) / ridden.motion.fps
+    return Follower(name=name, times=times,
+                    places=np.column_stack([ridden.motion.root_positions[:, :2], ridden.origin[:, 2]]))
+
+
+def _apply_change(settings: RideSettings, change: Change, fps: float) -> RideSettings:
+    """The settings with a change; riders wait for whole frames."""
+    waits = float(np.ceil(round(change.delay * fps, 3)) / fps)
+    return replace(settings, delay=settings.delay + waits, detours=change.detours)
+
+
+def _find_collisions(followers: list[Follower], distance: float) -> list:
+    """The collisions of the first body with the others."""
+    from ..path_editing.collisions import collisions
+
+    times = np.unique(np.concatenate([follower.times for follower in followers]))
+    places = np.stack([follower.at(times) for follower in followers])
+    return [hit for hit in collisions(times, places, distance) if hit.first == 0]
+
+
+def _describe_changes(asked: RideSettings, settings: RideSettings) -> list[str]:
+    waits = asked.delay - settings.delay
+    turns = (f"goes {abs(offset):.2f} m to the {'left' if offset > 0 else 'right'} {arc:.1f} m along the path"
+             for arc, _, offset in asked.detours)  # fmt: skip
+    return [*([f"waits {waits:.2f} s"] if waits else []), *turns]

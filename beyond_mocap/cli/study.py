@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import mimetypes
 import os
 import shutil
@@ -12,8 +11,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Writer, check_outputs
-from .progress_reporter import Told
+from .outputs import Told, Writer, add_own_verbs, check_outputs
 
 CLIPS, FORMS, ANSWERS = "clips", "forms", "answers"
 """Folders of a study."""
@@ -21,15 +19,9 @@ _MOVIE = ".mp4"
 _EMBED_MOST = 200_000_000  # bytes of all clips in one form
 
 
-def add(verbs):
-    """The verb's parser, with those of its own verbs."""
+def add_study(verbs):
     verb = verbs.add_parser("study", help="how natural motions look to people: order, form, analyse")
-    own = verb.add_subparsers(dest="study_verb", required=True, metavar="VERB", parser_class=type(verb))
-    for add_one in (_add_order, _add_form, _add_analyse):
-        add_one(own).add_argument(
-            "--json", action="store_true", default=argparse.SUPPRESS, help="progress as JSON lines on stderr",
-        )
-    return verb
+    return add_own_verbs(verb, "study_verb", _add_order, _add_form, _add_analyse)
 
 
 def _add_order(verbs):
@@ -163,9 +155,7 @@ def run_analyse(options, told: Told, writers: Mapping[str, Writer]) -> None:
     write_report(options.report, study_report(found))
     if page:
         atomic_write(options.html, page)
-    told.end()
-    for note in found.notes:
-        told.note(note)
+    told.end(found.notes)
     for one in found.findings:
         said = "more natural" if one.better else "not shown to be more natural"
         print(f"{one.new} over {one.old}: {said}, difference {one.mean:+.2f}, one-sided {p_text(one.holm_p)}")

@@ -21,8 +21,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
     """vertices (V, 3) m, Z up, and triangles (F, 3), indices of them; faces of more corners are split into fans.
 
     InputError, with the line, where a number is none, a face names a vertex that is not there or has fewer than three
-    corners; where there are no faces.
-    """
+    corners; where there are no faces."""
     vertices, triangles = [], []
     for place, words in _lines(path):
         if words[0] == "v":
@@ -40,8 +39,7 @@ def read_mesh(path: str | os.PathLike) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _lines(path) -> Iterator[tuple[str, list[str]]]:
-    """(place, words) of every line that says something; place is `file:line`. A line that ends in a backslash goes
-    on."""
+    """(place, words) of every line that says something; place is `file:line`. A backslash at a line's end goes on."""
     held: list[str] = []
     for count, line in enumerate(_text(path).split("\n"), 1):
         line = line.partition("#")[0].rstrip()

@@ -30,8 +30,7 @@ def plain_arrays(
 
     kind: what the file should be, for messages. types: of numbers that it may hold. unpacked: bytes of all its arrays
     together above which it is no such file. others: what a file is instead that has an array of such a name and no
-    text. InputError where it is no zip of such arrays.
-    """
+    text. InputError where it is no zip of such arrays."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
@@ -71,8 +70,7 @@ def _array(data: bytes, name: str, types: tuple[np.dtype, ...]) -> np.ndarray:
 
 
 def header_text(arrays: dict[str, np.ndarray], page: str) -> str:
-    """The text of a file, which is taken out of its arrays. InputError where it is none; `page` of the docs describes
-    it."""
+    """The text of a file, which is taken out of its arrays. InputError where it is none; `page`: of the docs."""
     header = arrays.pop(HEADER)
     if header.dtype != np.uint8:
         raise InputError("the file", "an .npz of something else", f"a text under {HEADER!r}", f"see {page}")

@@ -1,6 +1,6 @@
-"""The tables that leave and come back: provenance and ball CSVs, and the JSON report.
+"""The tables that leave and come back: the ball and its touches as CSV, and the JSON report.
 
-Every writer writes beside its target and renames, so that nobody ever sees half a file.
+Every writer writes beside its target and renames, so that half a file is never seen.
 """
 
 from __future__ import annotations
@@ -28,6 +28,11 @@ _SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ":": "colons", " ":
 _WITH_COMMA = re.compile(r"^([+-]?\d*),(\d*(?:[eE][+-]?\d+)?)$")
 _LATEST = 1e11  # seconds: feeds count from kick-off, some from 1970
 
+TOUCH_COLUMNS = (
+    "time_s", "uncertainty_s", "player", "part", "kind", "x_m", "y_m", "z_m",
+    "before_x_m_s", "before_y_m_s", "before_z_m_s", "after_x_m_s", "after_y_m_s", "after_z_m_s", "confidence",
+)  # fmt: skip
+
 
 def write_ball(path: str | os.PathLike, ball: BallPath) -> None:
     """Writes `time_s,x_m,y_m,z_m,measured`; a position that is not known leaves its cells empty."""
@@ -42,6 +47,16 @@ def read_ball(path: str | os.PathLike) -> BallPath:
     positions = np.column_stack([parse_column(rows, name, blank=True) for name in BALL_COLUMNS[1:4]])
     times, measured = parse_column(rows, "time_s"), parse_flags(rows, "measured")
     return BallPath(frozen_array(times), frozen_array(positions), frozen_array(measured, bool))
+
+
+def write_touches(path: str | os.PathLike, touches: Iterable) -> None:
+    """Writes one row for each touch (`ball.tracked.solve.SolvedTouch`), in their order."""
+    rows = (
+        (f"{touch.time:.4f}", f"{touch.uncertainty:.4f}", touch.player, touch.part, touch.kind,
+         *(f"{value:.3f}" for value in np.concatenate([touch.position, touch.before, touch.after])),
+         f"{touch.confidence:.3f}") for touch in touches
+    )  # fmt: skip
+    atomic_write(path, format_csv(TOUCH_COLUMNS, rows))
 
 
 def write_report(path: str | os.PathLike, report: dict) -> None:
@@ -71,11 +86,9 @@ def read_rows(
     """(place, row) for every row of a CSV file that is not empty; place is `file:line`, names and cells are stripped.
 
     others: other names that stand for `required` ones, or for more. separators: the first with which the header is one
-    counts; with others than a comma, a comma in a number is its decimal point, as spreadsheets of many countries have
-    it.
+    counts; with others than a comma, a comma in a number is its decimal point, as in many countries.
 
-    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells.
-    """
+    InputError where the file is missing, binary, empty, lacks a `required` column, or a row has too few cells."""
     text = _text(path)
     separator = next((one for one in separators if not _missing(_header(text, one, others), required)), ",")
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=separator)
@@ -87,18 +100,18 @@ def read_rows(
             if not any(cell.strip() for cell in cells):
                 continue
             if len(cells) < len(names):
-                raise InputError(
-                    place, f"{len(cells)} cells", f"{len(names)} as in the header", "complete or delete the row"
-                )
+                expected = f"{len(names)} as in the header"
+                raise InputError(place, f"{len(cells)} cells", expected, "complete or delete the row")
             cells = [cell.strip() for cell in cells]
-            yield place, dict(zip(names, cells if separator == "," else map(_with_point, cells)))
+            if separator != ",":
+                cells = [_WITH_COMMA.sub(r"\1.\2", cell) for cell in cells]
+            yield place, dict(zip(names, cells))
     except csv.Error as error:
         raise InputError(f"{path}:{reader.line_num}", str(error), "comma-separated values") from None
 
 
 def number(text: str, name: str, place: str, blank: bool = False) -> float:
-    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names the column and the
-    place."""
+    """A finite number from a cell, NaN from a blank one where `blank` allows; InputError names column and place."""
     if blank and text.lower() in ("", "nan"):
         return math.nan
     try:
@@ -140,10 +153,6 @@ def _named(names: Sequence[str], others: Mapping[str, str]) -> list[str]:
     return [others[name] if name in others and others[name] not in names else name for name in names]
 
 
-def _with_point(cell: str) -> str:
-    return _WITH_COMMA.sub(r"\1.\2", cell)
-
-
 def _missing(names: Sequence[str], required: Sequence[str]) -> list[str]:
     return [name for name in required if name not in names]
 
@@ -164,18 +173,7 @@ def parse_column(rows, name: str, blank: bool = False) -> np.ndarray:
 
 
 def parse_flags(rows, name: str) -> np.ndarray:
-    """Reads a column of 0 and 1.
-
-    Args:
-        rows: (place, row) pairs as `read_rows` yields them.
-        name: of the column.
-
-    Returns:
-        (N,) bool.
-
-    Raises:
-        InputError: where a cell holds anything else.
-    """
+    """(N,) bool: a column of 0 and 1 of rows as `read_rows` yields them. InputError for any other cell."""
     for place, row in rows:
         if row[name] not in ("0", "1"):
             raise InputError(place, f"{name} {row[name]!r}", "0 or 1")

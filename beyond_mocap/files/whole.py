@@ -15,8 +15,7 @@ from ..base.errors import InputError
 
 @contextlib.contextmanager
 def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
-    """A path beside `path` to write to. It takes the place of `path` when the block ends well, and is gone when it does
-    not.
+    """A path beside `path` to write to. It takes the place of `path` when the block ends well, else it is gone.
 
     ending: of that path's name, for writers that go by it. InputError where the folder is missing or cannot be written.
     """

@@ -11,29 +11,20 @@ from typing import Callable, Iterable
 from ..annotation import ClipAnnotation
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
-from ..motion.motion import Motion
 from ..synthetic.landing import ends_in_flight
 from . import cache, landings, one_skeleton, repair
+from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import BLOCK_LENGTHS, cluster_blocks
-from .describe_clips import described
-from .features import FPS
+from .features import FPS, describe_clips
 from .library import Library, Progress
 from .scan import Annotations, readable_clips
-from .synthetic_files import write_synthetic_clips
 
 
 def build(
-    folder: str | Path,
-    *,
-    rebuild: bool = False,
-    cache_dir: str | Path | None = None,
-    skeleton: str | Path | None = None,
-    unit: float | None = None,
-    seed: int = 0,
-    threads: int = 1,
-    progress: Progress | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    folder: str | Path, *, rebuild: bool = False, cache_dir: str | Path | None = None,
+    skeleton: str | Path | None = None, unit: float | None = None, seed: int = 0, threads: int = 1,
+    progress: Progress | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> Library:
     """The library of all recordings below `folder`, from its cache where nothing has changed.
 
@@ -42,8 +33,7 @@ def build(
     unit (default: guessed per file). seed: of the clustering. threads: how many files are read at once, which
     changes no bit of what comes out.
     Clips of other skeletons are brought to this one and all are mended (`one_skeleton`, `repair`); notes say how.
-    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled.
-    """
+    Raises InputError for unreadable files, a folder without clips, or clips without legs; Cancelled."""
     folder = Path(folder)
     report = progress or (lambda fraction, text: None)
     place, where = cache.place(folder, cache_dir)
@@ -83,7 +73,8 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
     """Reads all recordings, mends them, brings them to one skeleton, sets each on the floor, and adds the twins."""
     read, unpopped, level = zip(*_read_files(paths, files, unit, threads=threads, report=report, cancelled=cancelled))
     notes += _unit_notes(read)
-    carried = one_skeleton.bring(paths, [motion for motion, _ in level], _chosen(chosen, unit), notes)
+    example = bvh.read(chosen, unit).motion if chosen is not None else None
+    carried = one_skeleton.bring(paths, [motion for motion, _ in level], example, notes)
     mended, rows = [], []
     for number, (path, (motion, standing, moved)) in enumerate(zip(paths, carried)):
         _check(cancelled)
@@ -91,7 +82,7 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
         one = repair.grounded(motion, standing, moved)
         mended.append(replace(one, drift=one.drift + level[number][1]))
         rows.append(_rows(path, annotations.of(path, motion.fps), len(motion)))
-    notes += repair.told([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
+    notes += repair.describe_repairs([(one, pops) for one, (_, pops) in zip(mended, unpopped)])
     originals = _landed([path.relative_to(folder).as_posix() for path in paths], mended, rows, notes)
     told = [repair.Mended(pops, one.drift, *one.slide) for one, (_, pops) in zip(mended, unpopped)]
     originals = [replace(clip, mended=what) for clip, what in zip(originals, told)]
@@ -106,7 +97,7 @@ def _read_clips(folder, paths, files, annotations, chosen, unit, threads, notes,
 
 def _read_files(paths, files, unit, threads, report, cancelled) -> list[tuple]:
     """Each file as read, without pops (and their number), and without drift (and its metres); some at once. files: what
-    to read for each of `paths` (`converted`); the unit is that of the user's own files."""
+    to read for each of `paths` (`scan.Conversions`); the unit is that of the user's own files."""
 
     def read_one(path: Path, file: Path):
         source = bvh.read(file, unit if file == path else None)
@@ -138,13 +129,8 @@ def _landed(names: list[str], mended: list[repair.Repaired], rows, notes: list[s
                               standing=ends[-1].standing, recorded=ends[-1].recorded))
         else:
             clips.append(Clip(path=name, mirrored=False, motion=one.motion, annotations=own, standing=one.standing))
-    notes += landings.told(ends, ways)
+    notes += landings.describe_landings(ends, ways)
     return clips
-
-
-def _chosen(path: Path | None, unit: float | None) -> Motion | None:
-    """The recording whose skeleton the user chose."""
-    return bvh.read(path, unit).motion if path is not None else None
 
 
 def _rows(path: Path, rows: tuple[ClipAnnotation, ...], count: int) -> tuple[ClipAnnotation, ...]:
@@ -171,7 +157,7 @@ def _index(folder: str, clips, notes, seed, report, cancelled) -> Library:
     """Features, words and clusters of `clips`."""
     _check(cancelled)
     report(0.7, "Describing frames")
-    frames = described(clips)
+    frames = describe_clips(clips)
     clusters = {}
     for number, length in enumerate(BLOCK_LENGTHS):
         _check(cancelled)

@@ -1,7 +1,7 @@
 """What building a library worked out, kept in one `.npz` (never pickled) that depends on the content of every file
-read.
+read; and the synthetic clips beside it, as BVH.
 
-A damaged or stale cache is simply not used and written anew; the file is written beside its place and renamed, so two
+A damaged or stale cache is simply not used and written again; the file is written beside its place and renamed, so two
 processes that build at once do no harm: the later one wins with the same content.
 """
 
@@ -10,14 +10,16 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Iterable
 
 import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..base.digest import byte_digest
 from ..base.errors import InputError
+from ..files.bvh import bvh
 from ..motion.motion import Motion
 from ..motion.skeleton import Skeleton
 from .clip import Clip
@@ -28,10 +30,7 @@ from .scan import CACHE_FOLDER
 
 # raised whenever what is computed or stored changes, so that old caches are not used
 VERSION = 24
-_FRAME_ARRAYS = (
-    "clip", "source", "first", "count", "root", "heading", "path", "velocity", "feet", "jerk", "features", "mean",
-    "basis", "words",
-)
+_FRAME_ARRAYS = tuple(field.name for field in fields(Frames) if field.name != "vocabulary")
 
 
 def fingerprint(folder: Path, clips, sources, skeleton: Path | None, **options) -> str:
@@ -66,8 +65,7 @@ def own_folder(base: Path, folder: Path) -> Path:
 
 
 def save(place: Path, key: str, library, name: str = "library") -> bool:
-    """Writes `library` as `place`/`name`.npz and says whether it could; a place that cannot be written is left
-    alone."""
+    """Writes `library` as `place`/`name`.npz and says whether it could; a place that it cannot write is left alone."""
     arrays = {f"frames.{part}": getattr(library.frames, part) for part in _FRAME_ARRAYS}
     for length, clusters in library.clusters.items():
         for part in ("start", "label", "medoid"):
@@ -95,22 +93,14 @@ def save(place: Path, key: str, library, name: str = "library") -> bool:
 def _header(key: str, library) -> dict:
     skeleton = library.skeleton
     return {
-        "key": key,
-        "names": skeleton.names,
-        "parents": skeleton.parents,
-        "end_parents": skeleton.end_parents,
-        "vocabulary": library.frames.vocabulary,
-        "fps": library.fps,
-        "notes": library.notes,
+        "key": key, "names": skeleton.names, "parents": skeleton.parents, "end_parents": skeleton.end_parents,
+        "vocabulary": library.frames.vocabulary, "fps": library.fps, "notes": library.notes,
         "lengths": list(library.clusters),
         "clips": [
-            [
-                clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
-                clip.recorded, asdict(clip.mended) if clip.mended else None,
-            ]
-            for clip in library.clips
+            [clip.path, clip.mirrored, clip.motion.fps, len(clip.motion), [asdict(row) for row in clip.annotations],
+             clip.recorded, asdict(clip.mended) if clip.mended else None] for clip in library.clips
         ],
-    }
+    }  # fmt: skip
 
 
 def load(place: Path, key: str, name: str = "library") -> dict | None:
@@ -136,9 +126,8 @@ def load(place: Path, key: str, name: str = "library") -> dict | None:
 
 def _restore(header: dict, arrays: dict) -> dict:
     """The fields of a library but its folder."""
-    skeleton = Skeleton(
-        header["names"], header["parents"], arrays["offsets"], header["end_parents"], arrays["end_offsets"]
-    )
+    names, parents, ends = (header[part] for part in ("names", "parents", "end_parents"))
+    skeleton = Skeleton(names, parents, arrays["offsets"], ends, arrays["end_offsets"])
     clips, start = [], 0
     for path, mirrored, fps, count, rows, recorded, mended in header["clips"]:
         part = slice(start, start + count)
@@ -159,3 +148,16 @@ def _restore(header: dict, arrays: dict) -> dict:
         "skeleton": skeleton, "clips": tuple(clips), "frames": frames, "clusters": clusters, "fps": header["fps"],
         "notes": tuple(header["notes"]),
     }  # fmt: skip
+
+
+def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool = False) -> None:
+    """Writes clips that are made, or end so, as BVH beside the cache, so that whoever follows a take's provenance finds
+    them; a place that cannot be written is left alone. missing_only: those that are not there."""
+    try:
+        for clip in made:
+            file = place / Path(clip.source_at(len(clip.motion) - 1)).relative_to(CACHE_FOLDER)
+            if not clip.mirrored and not (missing_only and file.exists()):
+                file.parent.mkdir(parents=True, exist_ok=True)
+                bvh.write(file, clip.motion)
+    except OSError:
+        return

@@ -22,8 +22,7 @@ class Clip:
     toe heights, ../shared/metrics.md) at height 0. annotations: frames of its own rate, sides swapped on the twin.
     standing: (T, 2, 2) bool, left and right foot, whether heel and toe stand on the ground. recorded: number of frames
     that are recorded, where landing and getting up were made behind them (`library.landings`); None: all. mended: what
-    the repair found and left; None of made clips.
-    """
+    the repair found and left; None of made clips."""
 
     path: str
     mirrored: bool

@@ -3,9 +3,9 @@
 
 A block of B frames starts at every frame of a clip that has B frames left. Its place is the augmented feature vector:
 the frames' features, one after the other. We take eight frames of each block (every fourth of 32, every second of 16,
-all of
-8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say the same,
-and the clusters come out within a percent of those in all dimensions in a tenth of the time (../shared/perf.md §3).
+all of 8) and the principal components that hold 98 % of the blocks' variance before k-means: neighbouring frames say
+the same, and the clusters come out within a percent of those in all dimensions in a tenth of the time
+(../shared/perf.md §3).
 """
 
 from __future__ import annotations
@@ -49,8 +49,7 @@ def block_starts(frames: Frames, length: int) -> np.ndarray:
 
 
 def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
-    """k-means of all blocks of one length into 100 clusters (fewer where there are fewer blocks); empty where none
-    fits."""
+    """k-means of all blocks of one length into 100 clusters (fewer of fewer blocks); empty where none fits."""
     start = block_starts(frames, length)
     if not len(start):
         nothing = np.zeros(0, int)
@@ -66,8 +65,7 @@ def cluster_blocks(frames: Frames, length: int, seed: int = 0) -> Clusters:
 def _kmeans(points: np.ndarray, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Labels (M,) and the point nearest to each centre (count,); empty clusters are dropped.
 
-    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ.
-    """
+    One thread only: with more, scikit-learn adds partial sums in the order threads finish, and the bits differ."""
     from sklearn.cluster import KMeans
     from sklearn.exceptions import ConvergenceWarning
     from threadpoolctl import threadpool_limits

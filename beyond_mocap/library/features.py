@@ -1,10 +1,10 @@
 """Every frame of the library as a few numbers: joint positions, velocities and accelerations, reduced by PCA.
 
 Faustino §3.2 takes position, velocity and acceleration of all joints relative to the root, and §3.2.1 reduces them to
-the principal components that hold 98 % of the energy. He says neither in which frame nor in which scale. We take the
+the principal components that hold 98 % of the energy. It says neither in which frame nor in which scale. We take the
 root's heading frame (a walk north equals a walk east) and weigh velocity by 0.12 s and acceleration by half of 0.12 s
 squared: a distance between features is then in metres, about how far the joints will be apart an eighth of a second
-later. He drops each motion's first two frames, which lack derivatives; central differences lose none.
+later. Faustino drops each motion's first two frames, which lack derivatives; central differences lose none.
 """
 
 from __future__ import annotations
@@ -36,8 +36,7 @@ class Frames:
     (x forward, y left). feet (N, 4) m: where the left and the right toe (ankle where there is none) lie on the ground,
     from the path, in the facing frame. jerk (N,) m/s^3 of the joint that has most, from the third difference around
     each frame. features (N, D) float32, metres; mean (K,) and basis (K, D) with which they come from raw ones. words
-    (N, V) bool, one column per word of `vocabulary`.
-    """
+    (N, V) bool, one column per word of `vocabulary`."""
 
     clip: np.ndarray
     source: np.ndarray
@@ -85,8 +84,7 @@ def raw_features(positions: np.ndarray, heading: np.ndarray, fps: float) -> np.n
     """One clip's features before PCA: joint positions (T, K, 3) m with the root first, heading (T,) -> (T, 9 K - 2).
 
     The root's own position is left out except for its height (Faustino: "the position being the world center"). Divided
-    by the root of K, so that a distance is the root mean square over joints.
-    """
+    by the root of K, so that a distance is the root mean square over joints."""
     velocity = time_derivative(positions, fps)
     acceleration = time_derivative(velocity, fps)
     relative = positions.copy()
@@ -112,33 +110,35 @@ def principal_components(values: np.ndarray, energy: float = ENERGY) -> tuple[np
     return mean, vectors[:, :kept].astype(values.dtype)
 
 
-def describe(
-    skeleton: Skeleton, clips, words_of, vocabulary: tuple[str, ...], fps: float, like: Frames | None = None
-) -> Frames:
-    """Frames of all `clips` at `fps`. `words_of(clip, frames)` gives the (T, V) bool words at fractional clip frames.
-    like: frames whose components are used, so that features of both can be compared; else those of the clips
-    themselves."""
+def describe_clips(clips, like: Frames | None = None) -> Frames:
+    """Frames of `clips` (`library.clip`) at FPS with all words that they carry. like: frames whose components are used,
+    so that features of both can be compared; else those of the clips themselves."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):  # with more, sums of products come out in another order
+        return _describe(clips, like)
+
+
+def _describe(clips, like: Frames | None) -> Frames:
+    skeleton = clips[0].motion.skeleton
+    vocabulary = tuple(sorted({word for clip in clips for row in clip.annotations for word in row.words}))
     joints, body = feature_joints(skeleton), identify(skeleton)
     toes = [body.left.toe_or_foot, body.right.toe_or_foot]
     parts: dict[str, list[np.ndarray]] = {name: [] for name in _COLUMNS}
     counts = []
     for index, clip in enumerate(clips):
-        source, positions = sampled_positions(clip.motion, fps)
+        source, positions = sampled_positions(clip.motion, FPS)
         facing = np.unwrap(heading_from_positions(skeleton, positions))
-        path = zero_phase_hann(positions[:, 0, :2], fps, SMOOTH_SECONDS)
+        path = zero_phase_hann(positions[:, 0, :2], FPS, SMOOTH_SECONDS)
         counts.append(len(source))
         columns = (
-            np.full(len(source), index),
-            source,
-            positions[:, 0],
-            facing,
-            path,
-            quaternion.turned_level(time_derivative(path, fps), -facing),
+            np.full(len(source), index), source, positions[:, 0], facing, path,
+            quaternion.turned_level(time_derivative(path, FPS), -facing),
             _feet(positions, toes, path, facing),
-            most_jerk(positions, fps),
-            raw_features(positions[:, joints], facing, fps).astype(np.float32),
-            words_of(clip, source),
-        )
+            most_jerk(positions, FPS),
+            raw_features(positions[:, joints], facing, FPS).astype(np.float32),
+            words_matrix(clip, source, vocabulary),
+        )  # fmt: skip
         for name, column in zip(_COLUMNS, columns):
             parts[name].append(column)
     merged = {name: np.concatenate(columns) for name, columns in parts.items()}
@@ -146,6 +146,17 @@ def describe(
     merged["features"] = (merged["features"] - mean) @ basis
     count = np.array(counts)
     return Frames(first=np.cumsum(count) - count, count=count, mean=mean, basis=basis, vocabulary=vocabulary, **merged)
+
+
+def words_matrix(clip, source: np.ndarray, vocabulary: tuple[str, ...]) -> np.ndarray:
+    """(T, V) bool: which words of `vocabulary` a clip carries at fractional frames `source` (T,) of its own rate."""
+    column = {word: i for i, word in enumerate(vocabulary)}
+    out = np.zeros((len(source), len(vocabulary)), bool)
+    for row in clip.annotations:
+        inside = (source >= row.start) & (source <= row.end)
+        for word in row.words:
+            out[inside, column[word]] = True
+    return out
 
 
 def joined(a: Frames, b: Frames) -> Frames:

@@ -68,8 +68,7 @@ def nearest_serving(keys: tuple[Key, ...], words) -> tuple[Key, ...]:
 
 
 def _actions(words: frozenset[str]) -> frozenset[str]:
-    """The words that say what is done, not which side, at which pace: roots of App. A, else what is not a mere
-    colour."""
+    """The words that say what is done, not which side, at which pace: roots of App. A, else all but mere colour."""
     return words & DISCRETE or words - CONTINUOUS - VOCABULARY["modifier"].keys() or words
 
 

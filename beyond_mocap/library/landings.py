@@ -1,8 +1,8 @@
 """Recordings that end in flight are completed on entry: fall, landing and getting up are made behind them.
 
-A dive that is cut where it leaves the ground would be held in the air by whoever plays it to its end. What is made is
+A dive that is cut where it leaves the ground would be held in the air when it is played to its end. What is made is
 kept apart by name: frames behind a clip's recorded ones are told as those of a file of the same frames in the cache's
-folder (`LANDING_FOLDER`), which whoever follows a take's provenance can read.
+folder (`LANDING_FOLDER`), which readers of a take's provenance can read.
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray
     """Every way of getting up among clips (motion, rows, standing) of one skeleton; a made one where they show none."""
     found = [
         WayUp(motion.frames(int(row.start), int(row.end) + 1), standing[int(row.start) : int(row.end) + 1], row.words)
-        for motion, rows, standing in clips
-        for row in rows
+        for motion, rows, standing in clips for row in rows
         if "getting_up" in row.words and row.end - row.start > motion.fps and not ends_in_flight(motion)
     ]
     return found or [_made_way([(motion, rows) for motion, rows, _ in clips])]
@@ -57,12 +56,8 @@ def ways_up(clips: Sequence[tuple[Motion, tuple[ClipAnnotation, ...], np.ndarray
 def _made_way(clips) -> WayUp:
     """A made getting up for the skeleton of clips (motion, rows), whose upright stance the longest stretch of slow
     locomotion shows: keepers in wait, like runners, lean."""
-    upright = [
-        motion.frames(row.start, row.end + 1)
-        for motion, rows in clips
-        for row in rows
-        if row.key is None and _UPRIGHT & set(row.words)
-    ]
+    upright = [motion.frames(row.start, row.end + 1) for motion, rows in clips for row in rows
+               if row.key is None and _UPRIGHT & set(row.words)]  # fmt: skip
     example = max(upright, key=lambda motion: motion.duration, default=clips[0][0])
     gesture = getting_up(example.skeleton, _MADE_FPS, example=example).motion
     return WayUp(gesture, np.zeros((len(gesture), 2, 2), bool), ("getting_up", "back"), made=True)
@@ -94,7 +89,7 @@ def _longer(row: ClipAnnotation, recorded: int, last: int) -> ClipAnnotation:
     return replace(row, end=recorded - 1 if key is None else last, key=key)
 
 
-def told(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
+def describe_landings(completed_clips: Sequence[Completed], ways: Sequence[WayUp]) -> list[str]:
     """What was done, in one line, where anything was."""
     if not completed_clips:
         return []

@@ -19,21 +19,19 @@ from ..annotation.vocabulary import DIRECTIONS
 from ..base.errors import InputError
 from ..motion.skeleton import Skeleton
 from . import cache
+from .cache import write_synthetic_clips
 from .clip import Clip
 from .clusters import Clusters
-from .describe_clips import described
-from .features import FPS, Frames, joined
+from .features import FPS, Frames, describe_clips, joined
 from .keys import Key, keys_of
 from .made import KICK, TAKE, TAKES_FROM, gaps, locomotion, made_clips, touch_speed
-from .synthetic_files import write_synthetic_clips
 
 Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A kind of locomotion that the library holds: its word, all words of its most common row, and mean speed in
-    m/s."""
+    """A kind of locomotion of the library: its word, all words of its most common row, and mean speed in m/s."""
 
     word: str
     words: tuple[str, ...]
@@ -44,7 +42,7 @@ class Gait:
 class Library:
     """Everything a search needs. `frames`: all clips at `fps` (30); `clusters` by block length; notes: what was
     decided; kept: where its cache is and under which key, for what is worked out later; chosen: which clip stands for
-    which gait, (word, path) pairs (`library.chosen`)."""
+    which gait, (word, path) pairs (`library.automatic`)."""
 
     folder: str
     skeleton: Skeleton
@@ -90,7 +88,8 @@ class Library:
     @cached_property
     def feet_standing(self) -> np.ndarray:
         """(N, 2) bool: left and right foot on the ground, heel or toe."""
-        return np.concatenate([_standing(clip, self._own_frames(i)) for i, clip in enumerate(self.clips)])
+        stands = (clip.standing.any(axis=2)[_nearest(clip, self._own_frames(i))] for i, clip in enumerate(self.clips))
+        return np.concatenate(list(stands))
 
     def _own_frames(self, clip: int) -> np.ndarray:
         first = self.frames.first[clip]
@@ -150,13 +149,8 @@ def _made(library: Library) -> Library:
         clips += [clip, clip.twin()]
     if not clips:
         return replace(library, clips=())
-    frames = described(clips, library.frames)
+    frames = describe_clips(clips, library.frames)
     return replace(library, clips=tuple(clips), frames=frames, clusters={}, notes=())
-
-
-def _standing(clip: Clip, source: np.ndarray) -> np.ndarray:
-    """(T, 2) of one clip at its frames `source` (T,)."""
-    return clip.standing.any(axis=2)[_nearest(clip, source)]
 
 
 def _stance_seconds(clip: Clip, source: np.ndarray) -> np.ndarray:
@@ -183,8 +177,7 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
 
     A gait without a direction in its words counts as well as one with; rows of key moments and dribbles do not count,
     nor do made clips of a gait that is recorded, nor other clips than the chosen one, nor rows that a slower one would
-    overtake in the mean (then the word is dropped, since thresholds need an order).
-    """
+    overtake in the mean (then the word is dropped, since thresholds need an order)."""
     seconds: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     metres: dict[str, Any] = {word: Counter() for word in LOCOMOTION}
     frames = library.frames
@@ -217,9 +210,6 @@ def measure_gaits(library: Library) -> tuple[Gait, ...]:
 def gait_word(row: ClipAnnotation) -> str | None:
     """The gait that a row shows and nothing else, but for a direction; None of a key moment, an action or a dribble."""
     words = [word for word in row.words if word in LOCOMOTION]
-    alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0]} - _DIRECTIONS
+    alone = row.key is None and len(words) == 1 and not set(row.words) - {words[0], *DIRECTIONS}
     return words[0] if alone else None
-
-
-_DIRECTIONS = frozenset(DIRECTIONS)
 

@@ -17,9 +17,8 @@ from ..annotation import ClipAnnotation, spoken
 from ..base.errors import InputError
 from . import cache
 from .clip import Clip
-from .converted import Conversions, is_foreign
 from .library import Library
-from .scan import Annotations, own_recordings
+from .scan import Annotations, Conversions, is_foreign, own_recordings
 
 GOOD, FAIR, POOR, UNKNOWN = range(4)
 # m/s by which standing heels and toes slide, fair and poor from sqrt(a^2 + (b v)^2) on at the speed v: feet roll

@@ -1,8 +1,7 @@
 """What the recordings lack, made from them: speeds between and above them, kicks and taken balls on the run.
 
 Tracked players go at any speed up to 9 m/s; recordings leave gaps (../shared/data/README.md). A clip played at 0.875
-to 1.125 of its rate covers some speeds around its own; where too few seconds of recording reach a speed that way is a
-gap.
+to 1.125 of its rate covers some speeds around its own; where too few seconds reach a speed that way is a gap.
 
 Between two recordings a gap is filled by blending both in phase (`motion.phase_blend`, Faustino §6.2). Between a walk
 and a run, too: judged by eye and figure, such a mixture at 1.7 to 2.3 m/s is a brisk walk with a spring, then a
@@ -100,13 +99,11 @@ def locomotion(frames: Frames, clips: Sequence) -> np.ndarray:
 
 
 def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[str]) -> float:
-    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite where there is
-    none."""
+    """m/s of the fastest approach of a touch among `keys` that carries the words `act`; infinite without any."""
     speed = frames.speed  # worked out over all frames each time it is asked for
     found = [
         speed[frames.first[key.clip] + int(key.frame / clips[key.clip].motion.fps * 30.0 + 0.5)]
-        for key in keys
-        if act <= key.words and not clips[key.clip].made
+        for key in keys if act <= key.words and not clips[key.clip].made
     ]
     return float(max(found)) if found else np.inf
 
@@ -114,8 +111,7 @@ def touch_speed(frames: Frames, clips: Sequence, keys: Sequence, act: frozenset[
 def made_clips(
     clips: Sequence, frames: Frames, fps: float, gait_speeds: dict[str, float], keys: Sequence
 ) -> Iterator[Made]:
-    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with key moments
-    `keys`.
+    """All made clips of a library whose recordings are `clips`, described by `frames` at `fps`, with `keys`.
 
     gait_speeds: m/s of the recorded gaits. Names begin with MADE_FOLDER: they are kept beside the cache."""
     speeds = {**{word: v for word, v in _USUAL.items() if v > max(gait_speeds.values())}, **gait_speeds}
@@ -133,8 +129,7 @@ def made_clips(
 
 def upright_example(clips: Sequence) -> Motion:
     """Frames of all recordings, one a second: `motion.retargeting.neutral` takes the most upright of them for the way
-    this skeleton
-    stands. A single recording of a run leans, and made running would lean twice."""
+    this skeleton stands. A single recording of a run leans, and made running would lean twice."""
     parts = [
         at_frames(clip.motion, np.arange(0.0, len(clip.motion), clip.motion.fps)) for clip in clips if not clip.mirrored
     ]

@@ -32,9 +32,8 @@ def bring(
     motions: as read, in the order of `paths`; chosen: a recording whose skeleton is to be the library's (default: the
     skeleton with most frames, the first path's among equals). `notes` gets one line about what was brought over.
     Heels and toes stand where the recording's own do; where only the new body has toes they are looked for on it.
-    Raises InputError, naming the file, for a clip whose legs cannot be found.
-    """
-    standing = [_standing(path, motion) for path, motion in zip(paths, motions)]
+    Raises InputError, naming the file, for a clip whose legs cannot be found."""
+    standing = [_named(path, lambda: contacts.points(motion)) for path, motion in zip(paths, motions)]
     groups = _groups(motions)
     skeleton = chosen.skeleton if chosen is not None else _commonest(motions, groups)
     home = [i for i, motion in enumerate(motions) if motion.skeleton.same_bones(skeleton, SAME_BONES)]
@@ -53,12 +52,9 @@ def bring(
 
 
 def bring_one(motion: Motion, target: Motion, bone_map: dict[str, str] | str | Path | None = None) -> Motion:
-    """`motion` on the skeleton of `target`, a recording or a pose of it, feet held where they stood; its rate and
-    floor.
+    """`motion` on the skeleton of `target`, a recording or pose of it, feet held where they stood; same rate and floor.
 
-    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays as it is. Raises InputError as
-    there.
-    """
+    bone_map: see `motion.retargeting.retarget`. On its own skeleton a motion stays. Raises InputError as there."""
     points, feet = _points_if_named(motion), _points_if_named(target)
     rig = Retargeter(
         motion, target.skeleton, bone_map, example=target,
@@ -93,10 +89,6 @@ def _standing_there(there: Motion, skeleton: Skeleton, points: np.ndarray) -> np
     return contacts.points(there) if _has_toes(there.skeleton) and not _has_toes(skeleton) else points
 
 
-def _standing(path: Path, motion: Motion) -> np.ndarray:
-    return _named(path, lambda: contacts.points(motion))
-
-
 def _named(path: Path, work):
     """The result of `work`; what it finds wrong with a skeleton is told with the file's name."""
     try:
@@ -124,8 +116,7 @@ def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
 
 
 def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
-    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; heights over one
-    floor."""
+    """Some frames of all clips of one rig, and which feet (T, 2) are flat on the ground in them; over one floor."""
     ends = np.cumsum([len(motion) for motion in motions])
     frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
     roots, rotations, feet = [], [], []

@@ -31,7 +31,7 @@ from ..motion import contacts, quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions, identify, leg_length
 from ..motion.motion import Motion, forward_kinematics
 from .library import Library
-from .proposal import Proposal
+from .word_sources import Proposal
 
 if TYPE_CHECKING:
     from .classify.classifier import Classifier

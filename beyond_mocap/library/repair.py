@@ -52,8 +52,7 @@ class Repaired:
 
     standing (T, 2, 2): left and right, heel and toe, on the ground. drift: metres between the lowest and the highest
     floor. travel: metres by which the last frame was moved against the first. slide: m/s before and after, mean over
-    standing heels and toes. slid: whether it slid so much that way and feet were mended.
-    """
+    standing heels and toes. slid: whether it slid so much that way and feet were mended."""
 
     motion: Motion
     standing: np.ndarray
@@ -92,12 +91,10 @@ def without_pops(motion: Motion) -> tuple[Motion, int]:
 
 
 def without_drift(motion: Motion) -> tuple[Motion, float]:
-    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres while it lasts, and by how much it
-    did.
+    """The motion on a floor that neither rises nor sinks by more than _DRIFT metres and by how much it did.
 
     The floor is the lowest joint within _LOW_SECONDS (longer than a flight), smoothed. An inertial suit's floor can
-    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand.
-    """
+    rise by half a metre in five seconds, and `_levelled` knows only feet that are seen to stand."""
     low = forward_kinematics(motion)[0][..., 2].min(axis=1)
     width = max(1, int(round(_LOW_SECONDS * motion.fps)))
     floor = np.zeros((len(low), 1))
@@ -132,13 +129,11 @@ def _angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = False) -> Repaired:
-    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), with feet that stand
-    still.
+    """The motion on a level floor at height 0, where its soles stand (`contacts.ground_height`), feet standing still.
 
     standing (T, 2, 2) bool: left and right, heel and toe; found where it is not given. Feet are held, and the way is
     corrected, in clips that slide (`slides`); with `plants` feet are held in any case (a body that got other feet).
-    Bones and rate stay.
-    """
+    Bones and rate stay."""
     standing = contacts.points(motion) if standing is None else standing
     motion, drift = _levelled(motion, standing)
     before, travel = slide(motion, standing), 0.0
@@ -147,21 +142,20 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
         motion, travel = _travelled(motion, standing)
     if slid or plants:
         motion = held(motion, standing)
-    return Repaired(motion=_on_floor(motion), standing=standing, drift=drift, travel=travel,
+    level = motion.root_positions - [0.0, 0.0, contacts.ground_height(motion)]
+    return Repaired(motion=replace(motion, root_positions=level), standing=standing, drift=drift, travel=travel,
                     slide=(before, slide(motion, standing)), slid=slid)
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
-    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than good recordings of the motion's speed
-    show."""
+    """Whether feet that stand, by `standing` (T, 2, 2), slide faster than in good recordings of that speed."""
     way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
     speed = way.mean() * motion.fps if len(way) else 0.0
     return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)
 
 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
-    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at the heights they
-    have."""
+    """The motion with its feet held where `standing` (T, 2, 2) says that heels and toes stand, at their own heights."""
     planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
                     sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
@@ -184,24 +178,17 @@ def _ball_slide(motion: Motion, standing: np.ndarray) -> float:
     return float((speed * firm).sum() / max(firm.sum(), 1e-9))
 
 
-def _on_floor(motion: Motion) -> Motion:
-    floor = contacts.ground_height(motion)
-    return replace(motion, root_positions=motion.root_positions - [0.0, 0.0, floor])
-
-
 def _balls(motion: Motion) -> np.ndarray:
     """Where the balls of both feet are, (T, 2, 3) metres: toe joints, else on the way from ankle to the foot's tip.
 
-    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel.
-    """
+    They stand from the foot's landing to its push off; a heel rises meanwhile and says little of floor and travel."""
     skeleton, body = motion.skeleton, identify(motion.skeleton)
     places, world = forward_kinematics(motion)
     balls = []
     for limb in (body.left, body.right):
         ball = places[:, limb.toe_or_foot]
-        if limb.toe is None and limb.foot in skeleton.end_parents:
-            tip = skeleton.end_offsets[skeleton.end_parents.index(limb.foot)]
-            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * tip)
+        if limb.toe is None:
+            ball = ball + quaternion.rotate(world[:, limb.foot], _BALL * skeleton.tip(limb.foot))
         balls.append(ball)
     return np.stack(balls, axis=1)
 
@@ -226,8 +213,7 @@ def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
     """The motion whose pelvis goes where its standing feet say, and by how far its way is longer or shorter, metres.
 
     Only the middle of a stance tells: a foot that lands or leaves moves. On recordings without sliding the way comes
-    out as it was, to half a per cent.
-    """
+    out as it was, to half a per cent."""
     velocity = np.diff(_balls(motion)[..., :2], axis=0) * motion.fps
     weight = _inner(standing[..., 1])
     firm = np.minimum(weight[1:], weight[:-1])
@@ -251,8 +237,7 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     """The curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2, from pushed = w v (T, P), weights (T,
     P).
 
-    seconds: how slowly it can change; the stiffness is its fourth power.
-    """
+    seconds: how slowly it can change; the stiffness is its fourth power."""
     squares = BandedLeastSquares(len(pushed), reach=2)
     squares.add_value(weight.sum(axis=1) + pull)
     squares.add_difference(2, (seconds * fps) ** 4)
@@ -260,7 +245,7 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     return squares.solve()[:, 0]
 
 
-def told(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
+def describe_repairs(repaired: Sequence[tuple[Repaired, int]]) -> list[str]:
     """What was done to a library's clips, one line per kind. repaired: each clip's repair and its number of pops."""
     lines = []
     pops = [count for _, count in repaired if count]

@@ -1,17 +1,26 @@
-"""Which recordings lie below a folder, and which words were written about them."""
+"""Which recordings lie below a folder, whether they can be read, and which words were written about them.
+
+Recordings in forms that only Blender reads (FBX, glTF, USD) are converted once to BVH and kept beside the cache:
+`CACHE/converted/` mirrors the library's folders, `kicks/low.fbx` becomes `CACHE/converted/kicks/low.fbx.bvh`. A table
+of each source's size and time says whether a conversion still stands for it; one that does not is never read. Blender
+converts (the extension's Build Library does it first); the command line reads what has been converted.
+"""
 
 from __future__ import annotations
 
+import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, read_annotation_csv, read_clip_annotations
 from ..base.errors import InputError
-from .converted import FOREIGN, Conversions, is_foreign, told
+from ..files.whole import atomic_write
 
 CACHE_FOLDER = ".beyond_mocap"
 TABLE_NAME = "annotations.csv"
+FOREIGN = (".fbx", ".glb", ".gltf", ".usd", ".usda", ".usdc", ".usdz")
+_TABLE = "converted.json"
 
 
 def find_clips(folder: str | Path) -> list[Path]:
@@ -26,8 +35,7 @@ def find_clips(folder: str | Path) -> list[Path]:
 
 
 def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOREIGN)) -> list[Path]:
-    """All files below `folder` with one of these endings, as `find_clips`, converted or not; none where there are
-    none."""
+    """All files below `folder` with one of these endings, as `find_clips`, converted or not, or none."""
     folder = Path(folder)
     if not folder.is_dir():
         what = "no folder but a file" if folder.is_file() else "no such folder"
@@ -49,8 +57,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
 
 
 def own_recordings(folder: str | Path) -> list[Path]:
-    """The recordings that are a library's clips, as `find_recordings`: of two of one name (`kick.bvh` beside
-    `kick.fbx`) the BVH file."""
+    """The recordings that are a library's clips, as `find_recordings`: of `kick.bvh` beside `kick.fbx` the former."""
     found = find_recordings(folder)
     plain = {path.with_suffix("") for path in found if not is_foreign(path)}
     return [path for path in found if not is_foreign(path) or path.with_suffix("") not in plain]
@@ -59,8 +66,7 @@ def own_recordings(folder: str | Path) -> list[Path]:
 def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], Conversions, list[str]]:
     """The recordings of a library that can be read now, their conversions, and a line about those that wait for theirs.
 
-    place: the library's cache. InputError where there is none that can be read.
-    """
+    place: the library's cache. InputError where there is none that can be read."""
     found, conversions = own_recordings(folder), Conversions(folder, place)
     waiting = conversions.waiting(found)
     late = set(waiting)
@@ -70,7 +76,7 @@ def readable_clips(folder: str | Path, place: str | Path) -> tuple[list[Path], C
         raise InputError(folder, what, "at least one .bvh", "press Build Library in Blender, which converts them")
     if not ready:
         raise InputError(folder, "no BVH file below it", "at least one .bvh", "copy or link recordings into it")
-    return ready, conversions, told(waiting)
+    return ready, conversions, describe_waiting(waiting)
 
 
 def find_tables(folder: Path, clips: list[Path]) -> list[Path]:
@@ -113,3 +119,73 @@ class Annotations:
         """Every file that was or would be read for words: part of what the cache depends on."""
         texts = [clip.with_suffix(".txt") for clip in clips]
         return [path for path in texts if path.is_file()] + [place / TABLE_NAME for place in sorted(self.tables)]
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a recording has to be converted before it can be read."""
+    return path.suffix.lower() in FOREIGN
+
+
+class Conversions:
+    """Which recordings below a library's folder have been converted, and where that is kept.
+
+    folder: the library's; place: its cache (`cache.place`)."""
+
+    def __init__(self, folder: str | Path, place: str | Path):
+        """Reads the table; a damaged one counts as empty."""
+        self.folder, self.room = Path(folder), Path(place) / "converted"
+        try:
+            table = json.loads((self.room / _TABLE).read_text("utf-8"))
+            self._stamps = {str(name): list(stamp) for name, stamp in table.items()}
+        except (OSError, ValueError, AttributeError, TypeError):
+            self._stamps = {}
+
+    def readable(self, path: Path) -> Path:
+        """The BVH file to read for a recording: itself, or its conversion."""
+        return self.room / (self._name(path) + ".bvh") if is_foreign(path) else path
+
+    def stands(self, path: Path) -> bool:
+        """Whether a recording can be read as it is now."""
+        if not is_foreign(path):
+            return True
+        return self._stamps.get(self._name(path)) == stamp_of(path) and self.readable(path).is_file()
+
+    def waiting(self, paths: Sequence[Path]) -> list[Path]:
+        """Those of `paths` that are still to be converted."""
+        return [path for path in paths if not self.stands(path)]
+
+    def prepare(self, path: Path) -> Path:
+        """Makes the folder for a conversion and returns the file to write; InputError where that cannot be done."""
+        target = self.readable(path)
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            found, expected = f"cannot be written ({error.strerror})", "a folder for converted clips"
+            raise InputError(target.parent, found, expected, "choose another cache folder") from None
+        return target
+
+    def keep(self, path: Path, stamp: list[int]) -> None:
+        """Notes that a recording has been converted as it was when its `stamp` was taken."""
+        self._stamps[self._name(path)] = stamp
+        atomic_write(self.room / _TABLE, json.dumps(self._stamps, indent=0, sort_keys=True))
+
+    def _name(self, path: Path) -> str:
+        return path.relative_to(self.folder).as_posix()
+
+
+def describe_waiting(waiting: Sequence[Path]) -> list[str]:
+    """One line about recordings that are not converted yet; none where there are none."""
+    if not waiting:
+        return []
+    count, kinds = len(waiting), ", ".join(sorted({path.suffix.lower() for path in waiting}))
+    return [f"{count} {'clip' if count == 1 else 'clips'} left out ({kinds}: {waiting[0].name}): not converted; "
+            "Build Library in Blender converts them"]
+
+
+def stamp_of(path: Path) -> list[int]:
+    """Size and time of change of a file; zeros where it cannot be seen."""
+    try:
+        status = os.stat(path)
+    except OSError:
+        return [0, 0]
+    return [status.st_size, status.st_mtime_ns]

@@ -1,8 +1,8 @@
-"""Who said a clip's words, where it was not a person: each automatic row's source and how sure it was.
+"""Labels that no person gave: proposals, and where a clip's words say so, with each row's source and how sure it was.
 
 In a text it stands behind a line as a comment, `156f kick right low  # learned 0.93`, in a table in the columns
 `source` and `confidence`, where it has them. Only learning reads it; a row that a person has changed has none. A table
-of proposals says in a third column, `why`, what was seen: it is empty as soon as somebody has accepted the row.
+of proposals says in a third column, `why`, what was seen: it is empty as soon as a person has accepted the row.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ import csv
 import io
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..annotation import ClipAnnotation, clip_annotations, parse_timeline
 from ..annotation.text import read_text
-from .proposal import LEARNED, RULES
+
+RULES, LEARNED = "rules", "learned"
 
 Found = dict[ClipAnnotation, tuple[str, float]]
 Sources = Mapping[ClipAnnotation, tuple[str, float]]
@@ -24,6 +26,17 @@ Sources = Mapping[ClipAnnotation, tuple[str, float]]
 _COMMENT = re.compile(rf"#\s*({RULES}|{LEARNED})\s+([01](?:\.\d+)?)\s*$")
 COLUMNS = ("source", "confidence")
 _ROW = ("start_frame", "end_frame", "key_frame", "labels")
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Words for a stretch of a recording, in its own frames; confidence: 0 to 1; why: what was seen, for a person;
+    source: RULES, or LEARNED from annotated clips."""
+
+    annotation: ClipAnnotation
+    confidence: float
+    why: str
+    source: str = RULES
 
 
 def comment(row: ClipAnnotation, sources: Sources) -> str:
@@ -46,8 +59,7 @@ def is_open(row: Mapping) -> bool:
 def sources_in_text(path: Path, rows: tuple[ClipAnnotation, ...], fps: float) -> Found:
     """The sources of rows that were read from a text file; of a row with two lines the key moment's counts.
 
-    fps: the clip's rate. InputError where the file cannot be read.
-    """
+    fps: the clip's rate. InputError where the file cannot be read."""
     said = {}
     for line in read_text(path).splitlines():
         found = _COMMENT.search(line)

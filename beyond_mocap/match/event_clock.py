@@ -21,7 +21,7 @@ from ..annotation.event_words import EVENT_KINDS
 from ..ball.tracked.kinds import TOUCH_KINDS
 from ..ball.tracked.solve import SolvedTouch
 from ..base.errors import InputError
-from ..files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..motion.track.match_data import Half
 
 MOST_LAG = 300.0

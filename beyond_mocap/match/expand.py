@@ -15,7 +15,7 @@ import numpy as np
 
 from ..annotation import Span, Timeline
 from ..base.errors import InputError, spans_of
-from ..library.chosen import with_chosen_gaits
+from ..library.automatic import with_chosen_gaits
 from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER

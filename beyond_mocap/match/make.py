@@ -17,8 +17,8 @@ import numpy as np
 from ..ball.solve_ball import solve_ball
 from ..ball.tracked.solve import SolvedBall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
-from ..files.events.event_data import MatchEvents
-from ..files.events.events import read_events
+from ..files.event_data import MatchEvents
+from ..files.events import read_events
 from ..files.tables import write_ball
 from ..files.tracking.tracking import read_match
 from ..files.whole import atomic_write

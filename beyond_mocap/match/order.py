@@ -15,7 +15,7 @@ import numpy as np
 from .. import __version__
 from ..base.errors import InputError, told_time
 from ..base.settings import defaults
-from ..files.events.event_providers import EVENT_PROVIDERS
+from ..files.event_providers import EVENT_PROVIDERS
 from .pieces.units import OVERLAP, WINDOW
 
 _DEFAULTS = defaults("match")

@@ -28,7 +28,7 @@ from ..annotation.event_words import EventWords, read_event_words
 from ..ball.tracked import kinds
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.digest import hex_digest
-from ..files.events.event_data import CERTAIN, MatchEvent, MatchEvents
+from ..files.event_data import CERTAIN, MatchEvent, MatchEvents
 from ..files.whole import atomic_write
 from ..motion.track.match_data import Match
 from .event_clock import AlignedEvents, aligned

@@ -52,12 +52,10 @@ def ground_height(motion: Motion) -> float:
 
 
 def recorded_floor(motion: Motion) -> tuple[float, float]:
-    """The height in metres of the floor that a recording was made on, and how high over it the foremost joint of a foot
-    is that stands flat.
+    """The height in metres of the floor of a recording, and how high over it the foremost joint of a flat foot is.
 
     That floor is at height 0 where the soles are as near to it as soles and toe joints of recordings are (toe joints of
-    CMU are 4 to 6 cm over it, of Bandai 4, of the made gait 2); else it is as high as `ground_height`.
-    """
+    CMU are 4 to 6 cm over it, of Bandai 4, of the made gait 2); else it is as high as `ground_height`."""
     height = ground_height(motion)
     floor = at_zero(height)
     return floor, floor_height(motion) - floor
@@ -72,16 +70,14 @@ def detect(motion: Motion) -> np.ndarray:
     """Which foot stands flat on the ground: (T, 2) bool, left and right; any rate from 25 fps up.
 
     Flat is heel and toe (../shared/metrics.md averages the speed of both): while a foot rolls over one of them moves.
-    On recordings without sliding such stances travel a few millimetres.
-    """
+    On recordings without sliding such stances travel a few millimetres."""
     return points(motion).all(axis=2)
 
 
 def points(motion: Motion) -> np.ndarray:
     """Which point of which foot stands: (T, 2, 2) bool, left and right, heel (ankle joint) and toe.
 
-    Any rate from 25 fps up. A skeleton without toe joints has its ankles in both columns.
-    """
+    Any rate from 25 fps up. A skeleton without toe joints has its ankles in both columns."""
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
     leg = leg_length(motion.skeleton)
@@ -112,8 +108,7 @@ def _standing_heights(heights: np.ndarray, hips: np.ndarray, leg: float, fps: fl
     """How high each point is when it stands, around each moment: (T, 2) metres; from heights (T, 2) and hips' (T,).
 
     Upright: the lower envelope, a morphological opening, which follows a drifting floor without lag. Where the hips are
-    low (lying, getting up) a resting foot need not stand, so there it is the clip's own standing height.
-    """
+    low (lying, getting up) a resting foot need not stand, so there it is the clip's own standing height."""
     envelope = grey_opening(heights, size=(_window(_ENVELOPE_SECONDS, fps), 1), mode="nearest")
     other = envelope[:, ::-1]
     envelope = np.where(envelope - other > _HELD_UP, other, envelope)

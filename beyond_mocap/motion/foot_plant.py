@@ -22,8 +22,8 @@ from ..base.vectors import arctan2, cross
 from . import quaternion
 from .contacts import sole_height
 from .humanoid import Limb, identify
+from .limb import two_bone
 from .motion import pose_kinematics
-from .reach import two_bone
 from .skeleton import Skeleton
 
 SMOOTH, PULL = 0.005, 3e-4
@@ -103,14 +103,8 @@ class Foot:
 
 
 def plant(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    fps: float,
-    sinks: float = MOST_DROP,
-    moves: np.ndarray | None = None,
-    levels: bool = True,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
+    sinks: float = MOST_DROP, moves: np.ndarray | None = None, levels: bool = True,
 ) -> Planted:
     """The motion with its feet held on the ground, z = 0, wherever `standing` (T, 2, 2) says that heels and toes stand.
 
@@ -120,8 +114,7 @@ def plant(
     moved before that, and radians that its heel is turned up about its toe (`synthesis.construct.steps`). levels:
     standing feet are
     brought to the height of the ground and none goes below it; without, all keep the heights they have (a recording's
-    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth).
-    """
+    own floor is uneven by centimetres, and to press its feet onto z = 0 costs more jerk than it is worth)."""
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     scale, spread = 30.0 / fps, int(round(_BEHIND * fps / 30.0))
@@ -189,8 +182,7 @@ def turned_flat(foot: Foot, scale: float) -> Foot:
 def _goal(
     foot: Foot, weight: np.ndarray, lift: np.ndarray, tilt: np.ndarray, scale: float, spread: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m and tilt (T,) radians of the
-    heel."""
+    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4); lift (T,) m, tilt (T,) radians of the heel."""
     ground, weight = held_shift(foot.moves, weight, scale)
     moved = np.column_stack([ground, lift])
     rise = spread_over(heel_rise(foot, moved) * foot.weight[:, 1], spread) + tilt
@@ -202,8 +194,7 @@ def _goal(
 def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
     """(T,) least radians, at most MOST_RISE, by which a heel turns up about its toe so that the leg reaches its ankle.
 
-    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K.
-    """
+    With u from toe to hip, a from toe to heel, n the foot's left: |u - R a|^2 = L^2 is A cos r + B sin r = K."""
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
@@ -219,8 +210,7 @@ def held_shift(
     velocity: np.ndarray, weight: np.ndarray, scale: float, most: float = MOST_SHIFT
 ) -> tuple[np.ndarray, np.ndarray]:
     """The shift (T, 2), and the weights (T, 2) with which it was found: stances that would need more than `most` metres
-    are held less firmly, since a foot that slides looks better than a leg torn after it (give-way order,
-    ../shared/metrics.md)."""
+    are held less firmly, since a foot that slides looks better than a leg torn after it (../shared/metrics.md)."""
     ground = shift(velocity, weight, scale)
     for _ in range(4):
         far = np.where(weight.max(axis=1) > 0, np.linalg.norm(ground, axis=1), 0.0)
@@ -246,8 +236,7 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
     velocity (T - 1, P, K) or, for one point, (T - 1, K): movement per frame of P points; weight (T, P): how firmly each
     point stands. Minimizes sum w |D' + v|^2 + SMOOTH |D'''|^2 + PULL |D|^2 with differences per frame at 30 frames per
     second; `scale` is 30 over the rate, which keeps the balance at other rates. kept: (T, K) shifts that are given,
-    rows of NaN where D is free.
-    """
+    rows of NaN where D is free."""
     count = len(weight)
     if velocity.ndim == 2:
         velocity = velocity[:, None, :]

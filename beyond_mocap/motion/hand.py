@@ -24,8 +24,7 @@ class Hand:
     side: "left" or "right". fps. origin: (T, 3) m, the wrist. rotation: (T, 3, 3), from the hand's frame to the world.
     finger: (3,) unit, along the stretched fingers, and reach: m, from the wrist to their tips, both in the hand's
     frame. elbow: (T, 3) m. markers: labels that sharpen it. shift: (3,) m, from the motion to where its markers are,
-    which the origin has in it.
-    """
+    which the origin has in it."""
 
     side: str
     fps: float
@@ -69,19 +68,15 @@ def hand_of(motion: Motion, side: str) -> Hand:
 def _finger(motion: Motion, limb) -> tuple[np.ndarray, float]:
     """Unit direction (3,) of the fingers in the hand's frame, and how far their tips are from the wrist, m.
 
-    The skeleton's own tip where it has a likely one, else straight on from the forearm.
-    """
+    The skeleton's own tip where it has a likely one, else straight on from the forearm."""
     skeleton, hand = motion.skeleton, limb.hand
     forearm = float(np.linalg.norm(skeleton.offsets[hand]))
     usual = _HAND_OF_ARM * forearm
     tips = _tips(skeleton, hand)
-    lengths = np.linalg.norm(tips, axis=-1) if len(tips) else np.zeros(0)
-    if len(lengths) and 0.6 * usual < lengths.max() < 1.5 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), float(lengths.max())
-    if len(lengths) and lengths.max() > 0.1 * usual:
-        tip = tips[int(np.argmax(lengths))]
-        return tip / lengths.max(), usual
+    lengths = np.linalg.norm(tips, axis=-1)
+    longest = float(lengths.max(initial=0.0))
+    if longest > 0.1 * usual:
+        return tips[int(np.argmax(lengths))] / longest, longest if 0.6 * usual < longest < 1.5 * usual else usual
     return skeleton.offsets[hand] / max(forearm, 1e-9), usual
 
 

@@ -109,8 +109,7 @@ def side_and_part(name: str) -> tuple[str, str]:
 def identify(skeleton: Skeleton) -> Humanoid:
     """The meaning of a skeleton's joints, by names, else by the structure of its rest pose.
 
-    InputError where no legs can be found.
-    """
+    InputError where no legs can be found."""
     tips = (skeleton.end_parents, skeleton.end_offsets.tobytes())
     return _identify(skeleton.names, skeleton.parents, skeleton.offsets.tobytes(), tips)
 
@@ -118,8 +117,7 @@ def identify(skeleton: Skeleton) -> Humanoid:
 def identify_posed(motion: Motion) -> Humanoid:
     """As `identify`, but where names say nothing left and right are told from the recorded poses.
 
-    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there.
-    """
+    A rest pose may be folded up; recorded feet point forward and knees bend backward. InputError as there."""
     skeleton = motion.skeleton
     parts = [side_and_part(name) for name in skeleton.names]
     roles = _named(parts)
@@ -149,8 +147,7 @@ def _found(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray) -> dict[
 
 
 def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, int]:
-    """Roles found by structure, or those that names tell where it found none, or took what is named an arm for a
-    leg."""
+    """Roles found by structure, or those that names tell where it found none, or took a named arm for a leg."""
     arms = {joint for role, joint in named.items() if role.endswith(("arm", "hand"))}
     return named if not found or arms & {found[role] for role in _LEG_ROLES} else found
 
@@ -158,8 +155,7 @@ def _fitting(found: dict[str, int] | None, named: dict[str, int]) -> dict[str, i
 def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[str, int]) -> Humanoid:
     """A body from what is known about it. roles: "hips", "neck", "head", "left upper_leg" and the like -> joint.
 
-    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs.
-    """
+    Hips, spine, neck and head that are not named are found from where legs and arms hang. InputError without legs."""
     roles = dict(roles)
     if not _has_legs(roles):
         missing = [part for part in _LEG_ROLES if part not in roles]
@@ -178,9 +174,9 @@ def assemble(names: tuple[str, ...], parents: tuple[int, ...], roles: Mapping[st
     if chest is not None:
         roles.update({**structure.neck_and_head(parents, chest, set(roles.values()), roles), **roles})
     top = roles.get("neck", roles.get("head"))
-    spine = _chain(parents, roles["hips"], top) if top is not None else []
+    spine = structure.list_between(parents, roles["hips"], top) if top is not None else []
     if not spine and chest is not None and chest != roles["hips"]:
-        spine = [*_chain(parents, roles["hips"], chest), chest]
+        spine = [*structure.list_between(parents, roles["hips"], chest), chest]
     limbs = {side: Limb(**{part: roles.get(f"{side} {part}") for part in _LIMB_NAMES}) for side in ("left", "right")}
     mirror = _mirror([side_and_part(name) for name in names], parents, roles)
     neck, head = roles.get("neck"), roles.get("head")
@@ -227,15 +223,6 @@ def _centre(parts, part: str) -> int | None:
     return next((places[o] for o in _CENTRE_NAMES[part] if o in places), None)
 
 
-def _chain(parents, low: int, high: int) -> list[int]:
-    """Joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
-    chain, joint = [], parents[high]
-    while joint >= 0 and joint != low:
-        chain.append(joint)
-        joint = parents[joint]
-    return chain[::-1] if joint == low else []
-
-
 def _mirror(parts, parents, roles: Mapping[str, int]) -> tuple[int, ...]:
     """For each joint the one on the other side (itself where there is none)."""
     other = {"left": "right", "right": "left", "": ""}
@@ -250,8 +237,7 @@ def heading_from_positions(skeleton: Skeleton, positions: np.ndarray) -> np.ndar
     """Facing about Z, radians, 0 along +X: (..., J, 3) world positions -> (...,).
 
     Across = from right to left upper legs plus from right to left upper arms, so that neither a twisted pelvis nor
-    twisted shoulders alone decide; facing is across x up.
-    """
+    twisted shoulders alone decide; facing is across x up."""
     body = identify(skeleton)
     across = positions[..., body.left.upper_leg, :] - positions[..., body.right.upper_leg, :]
     if body.left.upper_arm is not None and body.right.upper_arm is not None:

@@ -47,8 +47,7 @@ def mirror(motion: Motion) -> Motion:
     """The same skeleton doing with its left what `motion` does with its right, mirrored at the plane y = 0.
 
     Travel along X and heights stay, Y turns its sign. Bones keep their lengths; where left and right ones differ, feet
-    and hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs.
-    """
+    and hands end up off the exact mirror image by that difference. Raises InputError where the skeleton has no legs."""
     body = identify(motion.skeleton)
     corrections = quaternion.from_matrix(_WORLD @ _correspondence(motion, body))
     _, world = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
@@ -109,12 +108,10 @@ def _bone_pairs(skeleton: Skeleton, body: Humanoid, joint: int) -> tuple[np.ndar
 
 
 def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
-    """The D (3, 3) of a joint from `usual` (D, 3, 3): how well it carries bones to bones (`pair`), and the mean
-    local rotations.
+    """The D (3, 3) of a joint from `usual` (D, 3, 3): how it carries bones to bones (`pair`), and mean rotations.
 
     In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average. `before`: the
-    parent's D, None at the root, whose rotation has no parent to be compared with.
-    """
+    parent's D, None at the root, whose rotation has no parent to be compared with."""
     bones, images = pair
     length = max(np.sum(bones**2), 1e-12)
     misfit = np.sum((bones @ usual.transpose(0, 2, 1) - images) ** 2, axis=(1, 2)) / length

@@ -13,14 +13,16 @@ from ..base.errors import InputError
 from . import quaternion
 from .skeleton import Skeleton, frozen_array
 
+_CUBIC_REACH = 8
+"""Frames to either side that a place between two frames depends on; a spline forgets at 0.27 a frame."""
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A skeleton's movement (Faustino §2.3.1 eq. 4).
 
     root_positions: (T, 3) metres, world, Z up. rotations: (T, J, 4) unit quaternions, each relative to its parent (the
-    root's to the world), sign-continuous over time. fps: frames per second.
-    """
+    root's to the world), sign-continuous over time. fps: frames per second."""
 
     skeleton: Skeleton
     root_positions: np.ndarray
@@ -65,11 +67,9 @@ def forward_kinematics(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def pose_kinematics(skeleton: Skeleton, root: np.ndarray, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (..., J, 3) and rotations (..., J, 4) from root positions (..., 3) and local rotations
-    (..., J, 4).
+    """World positions (..., J, 3) and rotations (..., J, 4) from roots (..., 3) and local rotations (..., J, 4).
 
-    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here.
-    """
+    Works joint by joint on component-first arrays: one contiguous run per component is what makes numpy fast here."""
     lead = local.shape[:-2]
     flat = np.ascontiguousarray(local.reshape(-1, len(skeleton), 4).transpose(1, 2, 0))
     world = np.empty_like(flat)
@@ -97,9 +97,7 @@ def _turn(q: np.ndarray, v: np.ndarray) -> np.ndarray:
     w, x, y, z = q
     vx, vy, vz = v
     tx, ty, tz = 2 * (y * vz - z * vy), 2 * (z * vx - x * vz), 2 * (x * vy - y * vx)
-    return np.stack(
-        [vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx]
-    )
+    return np.stack([vx + w * tx + y * tz - z * ty, vy + w * ty + z * tx - x * tz, vz + w * tz + x * ty - y * tx])
 
 
 def local_rotations(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
@@ -134,8 +132,7 @@ def end_positions(motion: Motion) -> np.ndarray:
 def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Root positions (N, 3) and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion.
 
-    Positions linear, rotations slerped: Faustino §3.3.2.
-    """
+    Positions linear, rotations slerped: Faustino §3.3.2."""
     frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
     low = np.minimum(np.floor(frames).astype(int), max(len(motion) - 2, 0))
     high = np.minimum(low + 1, len(motion) - 1)
@@ -144,6 +141,26 @@ def at_frames(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarra
     if not np.any(weight):
         return root, motion.rotations[low].copy()
     return root, quaternion.slerp(motion.rotations[low], motion.rotations[high], weight[:, None])
+
+
+def cubic_at(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Root positions (N, 3) m and local rotations (N, J, 4) at fractional frames (N,), clamped to the motion, on cubic
+    splines through the frames.
+
+    Linear steps (`at_frames`) go round corners at every frame. Joints that turn fast are followed much better by
+    splines of their rotations than by splines of where they are: a hand that throws at 20 m/s, given 30 times a second,
+    has its velocity within 1 %; by places it would lose 10 %."""
+    from scipy.interpolate import CubicSpline
+
+    frames = np.clip(np.asarray(frames, dtype=float), 0.0, len(motion) - 1)
+    low = max(int(np.floor(frames.min())) - _CUBIC_REACH, 0)
+    high = min(int(np.ceil(frames.max())) + _CUBIC_REACH, len(motion) - 1)
+    if high == low:
+        return motion.root_positions[[low] * len(frames)].copy(), motion.rotations[[low] * len(frames)].copy()
+    near = slice(low, high + 1)
+    rows = np.concatenate([motion.root_positions[near], motion.rotations[near].reshape(high + 1 - low, -1)], axis=1)
+    found = CubicSpline(np.arange(low, high + 1), rows)(frames)
+    return found[:, :3], quaternion.normalized(found[:, 3:].reshape(len(frames), -1, 4))
 
 
 def resample(motion: Motion, fps: float) -> Motion:
@@ -156,8 +173,7 @@ def resample(motion: Motion, fps: float) -> Motion:
 
 
 def place(motion: Motion, angle: float | np.ndarray = 0.0, offset=(0.0, 0.0, 0.0)) -> Motion:
-    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, then moved by `offset`
-    metres."""
+    """The motion turned by `angle` radians (one, or one per frame) about the world's Z, moved by `offset` metres."""
     turn = quaternion.about_up(np.broadcast_to(angle, (len(motion),)))
     rotations = motion.rotations.copy()
     rotations[:, 0] = quaternion.multiply(turn, rotations[:, 0])

@@ -68,8 +68,7 @@ class Strides:
 
 
 def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
-    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None with less than two
-    steps."""
+    """The longest stretch of `motion` in which feet land in turn, by `standing` (T, 2, 2); None below two steps."""
     sides, frames = _landings(standing, motion.fps)
     edges = np.flatnonzero(np.diff(sides) == 0) + 1
     first, last = max(zip([0, *edges], [*edges, len(sides)]), key=lambda run: run[1] - run[0])
@@ -98,8 +97,7 @@ def blend(slow: Strides, fast: Strides, speed: float, fps: float) -> tuple[Motio
     """Locomotion at `speed` m/s, in the mean, mixed from two recordings on one skeleton; from the origin along +X.
 
     Gives the motion at `fps` and standing (T, 2, 2) bool. As many steps as the shorter recording has, each mixed from
-    another one of both. A speed outside the two recordings' is brought to the nearer one.
-    """
+    another one of both. A speed outside the two recordings' is brought to the nearer one."""
     slow, fast = _in_step(slow, fast)
     steps = min(slow.steps, fast.steps)
     weight = _weight(slow, fast, steps, speed)
@@ -136,17 +134,14 @@ def _weight(slow: Strides, fast: Strides, steps: int, speed: float) -> float:
 
 def _sampled(one: Strides, phase: np.ndarray, steps: int) -> dict[str, np.ndarray]:
     """A recording at `phase` (T,) steps: pose (T, J, 4) relative to facing, height (T,), sway (T, 2) in the facing
-    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)
-    steps."""
+    frame, turn (T,) radians and way (T, 2) metres per step, and how far inside a stance each point is (T, 2, 2)."""
     curve = PchipInterpolator(np.arange(steps + 1.0), one.landings[: steps + 1])
     frames, pace = curve(phase), curve.derivative()(phase)
     root, pose = at_frames(one.motion, frames)
     facing, path = _at(one.facing, frames), _at(one.path, frames)
     pose[:, 0] = quaternion.multiply(quaternion.about_up(-facing), pose[:, 0])
     return {
-        "pose": pose,
-        "height": root[:, 2],
-        "sway": quaternion.turned_level(root[:, :2] - path, -facing),
+        "pose": pose, "height": root[:, 2], "sway": quaternion.turned_level(root[:, :2] - path, -facing),
         "turn": _at(np.gradient(one.facing), frames) * pace,
         "way": quaternion.turned_level(_at(np.gradient(one.path, axis=0), frames), -facing) * pace[:, None],
         "inside": _inside(one.standing, frames) / pace[:, None, None],
@@ -157,8 +152,7 @@ def _inside(standing: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """How many frames (T, 2, 2) away the nearest begin or end of a stance is, negative outside of stances.
 
     Mixing these distances moves begin and end of a stance from one recording's to the other's; mixing the labels would
-    let it jump halfway.
-    """
+    let it jump halfway."""
     out = np.empty((len(frames), 2, 2))
     for side in (_LEFT, _RIGHT):
         for point in (0, 1):

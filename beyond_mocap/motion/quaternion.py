@@ -117,8 +117,7 @@ def to_euler(q: np.ndarray, order: str) -> np.ndarray:
     """Intrinsic Tait-Bryan angles (..., 3) in radians of rotations (..., 4); `order` is a permutation of XYZ.
 
     The middle angle is within +-90 degrees. At the pole, where only the sum of the outer angles is determined, the
-    third is zero; the rotation is the same.
-    """
+    third is zero; the rotation is the same."""
     i, j, k = (_AXES[letter] for letter in order)
     sign = 1.0 if (j - i) % 3 == 1 else -1.0
     m = to_matrix(q)

@@ -24,8 +24,7 @@ class Skeleton:
 
     names: J joint names. parents: J indices, -1 for the one root, which is joint 0; parents stand before children.
     offsets: (J, 3) metres, from the parent's joint to this one while no joint is rotated, Z up; the root's is zero.
-    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own.
-    """
+    end_parents (E,), end_offsets (E, 3): tips (BVH End Sites), which carry no rotation of their own."""
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -60,6 +59,10 @@ class Skeleton:
     def children(self, joint: int) -> tuple[int, ...]:
         """Indices of the joints that hang on `joint`."""
         return tuple(i for i, p in enumerate(self.parents) if p == joint)
+
+    def tip(self, joint: int) -> np.ndarray:
+        """From a joint to its first end site (3,) m, in the joint's own axes; zero where it has none."""
+        return next((o for p, o in zip(self.end_parents, self.end_offsets) if p == joint), np.zeros(3))
 
     def part(self, joints: Collection[int]) -> tuple["Skeleton", list[int]]:
         """These joints and all above them as a skeleton without tips, and their indices in this one."""

@@ -1,5 +1,4 @@
-"""A critically damped follower of third order: what is off its goal fades, from any place, speed and acceleration,
-smoothly.
+"""A critically damped follower of third order: what is off its goal fades smoothly from any place, speed, acceleration.
 
 Offsets are vectors (rotation vectors, metres). All three poles lie at -rate, so that nothing overshoots from rest and
 the acceleration is continuous wherever the goal changes.
@@ -28,8 +27,4 @@ class Offset:
         c = 0.5 * (self.acceleration + 2.0 * rate * self.speed + rate**2 * a)
         left = np.exp(-rate * t)
         value, slope, bend = a + b * t + c * t**2, b + 2.0 * c * t, 2.0 * c
-        return Offset(
-            left * value,
-            left * (slope - rate * value),
-            left * (bend - 2.0 * rate * slope + rate**2 * value),
-        )
+        return Offset(left * value, left * (slope - rate * value), left * (bend - 2.0 * rate * slope + rate**2 * value))

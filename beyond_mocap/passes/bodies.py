@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation import Timeline, automatic_gaits
-from ..annotation.gaze import wanted_offset
+from ..annotation.gaits import wanted_offset
 from ..annotation.striking import BODY_PARTS
 from ..annotation.timeline import KeyMoment
 from ..ball.contact import striking_surface

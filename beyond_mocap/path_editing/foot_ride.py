@@ -31,8 +31,8 @@ from ..motion.foot_plant import (
     turned_flat,
 )
 from ..motion.humanoid import Limb, identify
+from ..motion.limb import CLEAR_BEND, bent_limb
 from ..motion.motion import pose_kinematics
-from ..motion.reach import CLEAR_BEND, bent_limb
 from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 from .ground_contact import Surface, footing

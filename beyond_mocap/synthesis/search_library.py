@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..annotation.ball_contact import takes_with_foot
-from ..library.chosen import with_chosen_gaits
+from ..library.automatic import with_chosen_gaits
 from ..library.library import Library
 from ..motion.track import sample
 from .plan import ResolvedPlan

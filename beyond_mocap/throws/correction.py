@@ -1,7 +1,7 @@
 """A throw or kick made to hit: the smallest change of a motion with which the ball, as it leaves, flies to its target.
 
 A ball in the hand has the hand's velocity when it leaves; a ball that lies gets its own from the foot that meets it
-(`letting_go`). Both follow from the motion alone, between frames too (`motion.between_frames`), so a ball that is to
+(`letting_go`). Both follow from the motion alone, between frames too (`motion.motion.cubic_at`), so a ball that is to
 fly elsewhere asks for another motion. What people change when they aim comes first and costs little: the body turns,
 the ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. What is left is a
 small smooth shift of the wrist or ankle about that instant (`led_limb`), which the arm or leg follows by inverse
@@ -19,8 +19,7 @@ from ..ball import batch
 from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
-from ..motion.motion import Motion, forward_kinematics, place
+from ..motion.motion import Motion, cubic_at, forward_kinematics, place
 from .led_limb import Hold, LedLimb, at_once, shifts_about
 from .letting_go import AtFoot, InHand, carried, grip_point
 

@@ -21,10 +21,9 @@ from ..base.errors import Cancelled, InputError
 from ..evaluation.paired_tests import kept
 from ..files.tables import plain
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
 from ..motion.hand import hand_of, usual_centre
 from ..motion.humanoid import identify
-from ..motion.motion import Motion, forward_kinematics, pose_kinematics
+from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
 from ..synthesis.quality.jerk import jerk
 from .networks.chains import EFFECTORS, chains_of
 from .networks.description import scaled

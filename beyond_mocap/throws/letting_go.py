@@ -1,6 +1,6 @@
 """What lets a ball go: a hand that holds it, or a foot that meets it where it lies.
 
-Both are points that joints carry, between frames too (`motion.between_frames`): the ball in the hand, the ends of the
+Both are points that joints carry, between frames too (`motion.motion`): the ball in the hand, the ends of the
 foot's line. Where they are and how they move at one instant says how the ball leaves.
 
 A ball that lies leaves along the line from the foot's surface to its centre `RATIO` times as fast as the foot comes:
@@ -22,9 +22,8 @@ from ..ball.physics import Ball
 from ..base.errors import InputError
 from ..base.vectors import unit_vector
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify
-from ..motion.motion import Motion, forward_kinematics, pose_kinematics
+from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
 from ..synthesis.construct.ball.carry import arm, leg
 
 BEFORE, AFTER = 0.4, 0.4

@@ -18,7 +18,7 @@ from ..annotation import ClipAnnotation, KeyMoment, Span, Timeline, labels
 from ..base.easing import quintic_between
 from ..base.errors import InputError, TimedLine, told_time
 from ..library.clip import Clip
-from ..library.describe_clips import described
+from ..library.features import describe_clips
 from ..library.features import joined as joined_frames
 from ..library.library import Library
 from ..motion import contacts
@@ -176,7 +176,7 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
     row = ClipAnnotation(edge, len(motion) - 1 - edge, key, words)
     clip = Clip(path=_CLIP, mirrored=False, motion=motion, annotations=(row,), standing=contacts.points(motion))
-    frames = joined_frames(library.frames, described([clip], library.frames))
+    frames = joined_frames(library.frames, describe_clips([clip], library.frames))
     return replace(library, clips=(*library.clips, clip), frames=frames, clusters={}, kept=None)
 
 

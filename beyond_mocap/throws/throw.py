@@ -21,10 +21,9 @@ from ..ball.physics import FASTEST, Ball
 from ..base.errors import Cancelled, InputError
 from ..base.vectors import arctan2
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify, stature
 from ..motion.mirror import mirror
-from ..motion.motion import Motion, place
+from ..motion.motion import Motion, cubic_at, place
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import FASTEST as FASTEST_HAND

@@ -20,9 +20,8 @@ from ..files.bvh import bvh
 from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
 from ..library.scan import Annotations, find_clips
 from ..motion import quaternion
-from ..motion.between_frames import cubic_at
 from ..motion.humanoid import Humanoid, identify
-from ..motion.motion import Motion, end_positions, forward_kinematics, place, pose_kinematics
+from ..motion.motion import Motion, cubic_at, end_positions, forward_kinematics, place, pose_kinematics
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.skeleton import Skeleton
 from ..synthetic.throws import grip_of

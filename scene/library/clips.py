@@ -224,8 +224,7 @@ def _is_words(name: str) -> bool:
 
 def _below(folder: str):
     """The paths of all recordings and words below a folder; links are followed, each folder is looked into once."""
-    from ...beyond_mocap.library.converted import FOREIGN
-    from ...beyond_mocap.library.scan import CACHE_FOLDER, TABLE_NAME
+    from ...beyond_mocap.library.scan import CACHE_FOLDER, FOREIGN, TABLE_NAME
 
     wanted, seen = (".bvh", ".txt", TABLE_NAME, *FOREIGN), set()
     for here, folders, files in os.walk(folder, followlinks=True):

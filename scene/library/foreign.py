@@ -71,8 +71,7 @@ class Queue:
     def __init__(self, folder: str | Path, cache_dir: str | None):
         """Looks which recordings below `folder` wait; InputError where there is no folder."""
         from ...beyond_mocap.library import cache
-        from ...beyond_mocap.library.converted import Conversions
-        from ...beyond_mocap.library.scan import own_recordings
+        from ...beyond_mocap.library.scan import Conversions, own_recordings
 
         folder = Path(folder)
         self.conversions = Conversions(folder, cache.place(folder, cache_dir)[0])
@@ -81,7 +80,7 @@ class Queue:
 
     def step(self) -> None:
         """Convert the next one; one that cannot be converted is told and left out."""
-        from ...beyond_mocap.library.converted import stamp_of
+        from ...beyond_mocap.library.scan import stamp_of
 
         path = self.todo.pop(0)
         stamp = stamp_of(path)  # before it is read: what is changed meanwhile is converted again

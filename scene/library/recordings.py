@@ -39,7 +39,7 @@ def file_of(settings, path: str, folder: str = "") -> tuple[Path, float | None]:
     library's folder; folder: as a setting spells it, the scene's own where empty. InputError where it is missing, or
     waits to be converted."""
     from ...beyond_mocap.library import cache
-    from ...beyond_mocap.library.converted import Conversions, is_foreign
+    from ...beyond_mocap.library.scan import Conversions, is_foreign
 
     where = Path(absolute(folder)) if folder else folder_of(settings)
     file = where / path

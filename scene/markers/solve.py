@@ -94,7 +94,7 @@ def settings_of(cloud: bpy.types.Object, chosen, words: tuple[str, ...] = ()) ->
 
 def clip_place(scene: bpy.types.Scene, name: str) -> Path:
     """Where the clip goes in the library's folder. InputError where there is none, or where the name is taken."""
-    from ...beyond_mocap.library.add_clip import free_place
+    from ...beyond_mocap.library.keep_words import free_place
 
     folder = scene.beyond_mocap.library_folder
     if not folder:
@@ -151,7 +151,7 @@ def add(order: Order, made: "Reconstruction") -> list[str]:
     """Write the clip and its words into the library, where that was asked for; lines about it."""
     if order.add is None:
         return []
-    from ...beyond_mocap.library.add_clip import add_clip
+    from ...beyond_mocap.library.keep_words import add_clip
 
     throw = made.release is not None and any(word.startswith("throw") for word in order.words)
     key = made.release.time if throw else None

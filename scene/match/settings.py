@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.props import CollectionProperty, EnumProperty, FloatProperty, FloatVectorProperty, IntProperty, StringProperty
 
-from ...beyond_mocap.files.events.event_providers import EVENT_PROVIDERS
+from ...beyond_mocap.files.event_providers import EVENT_PROVIDERS
 from ...beyond_mocap.files.tracking.providers import PROVIDERS
 from ..core.properties import with_settings
 from .kits import USUAL, linear, repaint, written

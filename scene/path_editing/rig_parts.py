@@ -150,7 +150,7 @@ def _constant(offsets: np.ndarray) -> np.ndarray:
 def _feet_where_they_are(skeleton: Skeleton, names: list[str], places: np.ndarray, local: np.ndarray) -> np.ndarray:
     """Local rotations (F, J, 4) with which the ankles are at their places (F, J, 3) although no bone stretches; what
     stands in the rig stands in the motion, to be held there."""
-    from ...beyond_mocap.motion.reach import two_bone  # this brings scipy, which is slow to import
+    from ...beyond_mocap.motion.limb import two_bone  # this brings scipy, which is slow to import
 
     shown, _ = pose_kinematics(skeleton, places[:, 0], local)
     for side in ("left", "right"):

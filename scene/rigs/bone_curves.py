@@ -61,7 +61,7 @@ def wanted(driven: Driven, motion: Motion, frames: np.ndarray, root: str):
 def _root_line(driven: Driven, motion: Motion, heads: np.ndarray, way: str):
     """The root's turn (F, 4) and place (F, 3) in the world: on the ground under the pelvis, as it rests below it."""
     from ...beyond_mocap.motion.humanoid import heading_from_positions
-    from ...beyond_mocap.motion.path.root_path import ground_path
+    from ...beyond_mocap.motion.path.smooth_spline import ground_path
 
     middle = heads[:, [driven.parts.index(f"{side} upper_leg") for side in ("left", "right")]].mean(axis=1)
     facing = np.unwrap(heading_from_positions(motion.skeleton, heads))
@@ -172,7 +172,7 @@ def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
     (F, 4, 4); both None where they are not asked for. shown, wanted: of `export`."""
     if wanted.root == "KEEP":
         return None, None, None, None
-    from ...beyond_mocap.motion.path.root_path import ground_path
+    from ...beyond_mocap.motion.path.smooth_spline import ground_path
 
     table = bone_maps.kept(rig) or bone_maps.suggest(rig)
     at = {part: shown.bones.index(table[part]) for part in ("left upper_leg", "right upper_leg")}

@@ -19,8 +19,7 @@ from ..library.recordings import RATE
 from . import lanes, lay_strips
 
 if TYPE_CHECKING:
-    from ...beyond_mocap.library.proposal import Proposal
-    from ...beyond_mocap.library.word_sources import Sources
+    from ...beyond_mocap.library.word_sources import Proposal, Sources
 
 SAME = 0.1
 """Seconds within which two key moments are the same one."""

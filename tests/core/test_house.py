@@ -157,7 +157,7 @@ def test_a_planted_offence_in_the_core_is_seen(path, text):
 @pytest.mark.parametrize("path, text", [
     ("beyond_mocap/motion/a.py", "import numpy as np\nfrom . import quaternion\nfrom .skeleton import Skeleton"),
     ("beyond_mocap/library/a.py", "def f():\n    from sklearn.cluster import KMeans"),
-    ("beyond_mocap/synthesis/construct/a.py", "from ...motion.reach import solve\nfrom ..plan import Plan"),
+    ("beyond_mocap/synthesis/construct/a.py", "from ...motion.limb import two_bone\nfrom ..plan import Plan"),
     ("beyond_mocap/match/a.py", "from ..passes.way import way\nfrom ..evaluation import report"),
     ("beyond_mocap/synthetic/ground_truth/a.py", "from ...markers.trial import MarkerTrial"),
     ("beyond_mocap/cli/a.py", "from .. import __version__"),

@@ -32,8 +32,7 @@ class BvhText:
 
     names: J unique names. parents: J indices, -1 for joint 0. offsets: (J, 3). channels: J tuples of channel names.
     end_parents (E,), end_offsets (E, 3): End Sites. frame_time: seconds. values: (T, C), joints' channels in file
-    order. first_row: line of the first frame. renamed: names that stood twice, with what they became.
-    """
+    order. first_row: line of the first frame. renamed: names that stood twice, with what they became."""
 
     path: Path
     names: tuple[str, ...]
@@ -68,9 +67,7 @@ def parse_data(path: Path, data: bytes) -> BvhText:
     values = _rows(path, data[body - 1 :], columns, line)  # from the line's end before: blanks around
     if len(values) != frames:
         raise InputError(
-            f"{path}:{line}",
-            f"{len(values)} rows of motion",
-            f"{frames} as Frames says",
+            f"{path}:{line}", f"{len(values)} rows of motion", f"{frames} as Frames says",
             f"the file is {'cut off' if len(values) < frames else 'damaged'}; {_EXPORT_AGAIN}",
         )
     _check_angles(path, joints, values, line)
@@ -130,17 +127,10 @@ class _Hierarchy:
         """The joints together with the motion's numbers."""
         ends = [(joint, offset) for joint, offset in self.ends if offset is not None]
         return BvhText(
-            path=self.path,
-            names=tuple(self.names),
-            parents=tuple(self.parents),
-            offsets=np.array(self.offsets),
-            channels=tuple(self.channels),
-            end_parents=tuple(joint for joint, _ in ends),
-            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3),
-            frame_time=frame_time,
-            values=values,
-            first_row=first_row,
-            renamed=tuple(self.renamed),
+            path=self.path, names=tuple(self.names), parents=tuple(self.parents), offsets=np.array(self.offsets),
+            channels=tuple(self.channels), end_parents=tuple(joint for joint, _ in ends),
+            end_offsets=np.array([offset for _, offset in ends]).reshape(-1, 3), frame_time=frame_time, values=values,
+            first_row=first_row, renamed=tuple(self.renamed),
         )
 
     def _error(self, found: str, expected: str = "", next_step: str = _EXPORT_AGAIN) -> InputError:

@@ -1,9 +1,10 @@
-"""A motion as the text of a BVH file: hierarchy in file order, Euler angles, centimetres, Y up."""
+"""A motion as the text of a BVH file, in the form it came in (`BvhForm`): hierarchy in file order, Euler angles,
+centimetres, Y up."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Iterator
+from dataclasses import dataclass, field
+from typing import Iterator, Mapping
 
 import numpy as np
 
@@ -11,7 +12,6 @@ from ...motion import quaternion
 from ...motion.humanoid import heading
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
-from .bvh_form import BvhForm, RootAbove
 from .bvh_text import POSITIONS, ROTATIONS
 
 _CENTIMETRES = 100.0
@@ -21,12 +21,42 @@ _SAME_ANGLE = np.degrees(1e-6)
 
 
 @dataclass(frozen=True, kw_only=True)
+class RootAbove:
+    """A joint that stood above the hips, from the file's root down.
+
+    moves: whether it travelled with the body (LAFAN1's SimulationBone) instead of standing still (Bandai's joint_Root).
+    position: (3,) metres, rotation: (4,), relative to the joint above it; constant, of the first frame where it moves.
+    heading: radians from the body's facing to this joint's, where it moves. carries: (3,) metres, the hips' place in
+    it, where it stands right above hips that have no position channels of their own."""
+
+    name: str
+    channels: tuple[str, ...]
+    moves: bool
+    position: np.ndarray
+    rotation: np.ndarray
+    heading: float = 0.0
+    carries: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class BvhForm:
+    """What writing back needs beyond the motion.
+
+    channels: each joint's channel names in order. above: joints above the hips. unit: metres per file unit, and up: "Y"
+    or "Z", as read (files are always written in centimetres with Y up)."""
+
+    channels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    above: tuple[RootAbove, ...] = ()
+    unit: float = 0.01
+    up: str = "Y"
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Joint:
     """A joint as it is to stand in the file, centimetres and degrees, Y up.
 
     depth: how many stand above it. offset: (3,). channels: names in order. columns: (T, channels). ends: (E, 3) tips.
-    added: channels that its form lacked.
-    """
+    added: channels that its form lacked."""
 
     name: str
     depth: int
@@ -56,9 +86,7 @@ def euler_degrees(rotations: np.ndarray, letters: str) -> np.ndarray:
     """Angles (T, 3) in degrees of rotations (T, 4) in the order of `letters`, completed to a permutation of XYZ.
 
     Three letters: the middle angle within +-90 degrees. Fewer: of the two triples that make a rotation, (a, b, c) and
-    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero, so that these can be left
-    out.
-    """
+    (a + 180, 180 - b, c + 180), the one whose angles beyond `letters` are nearer to zero and can be left out."""
     order = letters + "".join(axis for axis in "ZXY" if axis not in letters)
     angles = np.degrees(quaternion.to_euler(rotations, order))
     if len(letters) == 3:

@@ -64,13 +64,9 @@ def _shirt(player) -> tuple[str, int, str]:
 
 def described(player) -> tuple[str, str, str, str, str]:
     """Id, team, name, number and position of one of kloppy's players."""
-    id_, shirt = str(player.player_id), player.jersey_no
+    id_, shirt = str(player.player_id), str(-1 if player.jersey_no is None else int(player.jersey_no))
     ground = str(player.team.ground)
-    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, _number(shirt), _position(player)
-
-
-def _number(shirt) -> str:
-    return str(-1 if shirt is None else int(shirt))
+    return id_, ground if ground in ("home", "away") else REFEREE, player.name or id_, shirt, _position(player)
 
 
 def _position(player) -> str:
@@ -101,9 +97,7 @@ def to_metres(system, length: float, width: float, upward: bool):
 
     kloppy's own transformations pass through its standard pitch and bend positions between the lines; this one is
     linear. upward: y grows upward whatever the system says. kloppy turns the y of Metrica's CSV over while reading and
-    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y grows
-    downward.
-    """
+    still calls it downward; Metrica says (and the same match in TRACAB's form agrees) that the file's own y does."""
     size = system.pitch_dimensions
     x, y = size.x_dim, size.y_dim
     scale = {"METERS": (1.0, 1.0), "CENTIMETERS": (0.01, 0.01)}.get(size.unit.name)

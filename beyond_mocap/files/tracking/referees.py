@@ -1,4 +1,4 @@
-"""Referees in tracking files; kloppy leaves them out, so they are read here, for the providers that have them."""
+"""What kloppy leaves out of tracking, read here for the providers that have it: referees, and the colours of shirts."""
 
 from __future__ import annotations
 
@@ -12,6 +12,11 @@ from .feed import Feed, Samples
 
 _TRACAB_CODE = 3
 _TRACAB = re.compile(rb"[;:]3,(-?\d+),(-?\d+),(-?\d+\.?\d*),(-?\d+\.?\d*),")
+_COLOUR = re.compile(r"#?([0-9a-fA-F]{6})")
+_JSON_COLOUR = r'"{side}_?[tT]eam_?[kK]it"\s*:\s*\{{[^{{}}]*?"(?:primaryColor|jersey_color)"\s*:\s*"([^"]+)"'
+_XML_TEAM = re.compile(r"<Team\b[^>]*>")
+_XML_SHIRT = re.compile(r'PlayerShirtMainColor="([^"]+)"')
+_LARGEST = 16 * 1024 * 1024  # bytes of metadata
 
 
 def referee_samples(feed: Feed, frames: np.ndarray) -> tuple[list[str], np.ndarray, list[str]]:
@@ -84,3 +89,26 @@ def read_signality_referees(feed: Feed) -> Samples:
                 x, y = who["position"][:2]
                 yield frame["idx"] + before, f"referee_{who.get('role', who.get('track_id'))}", float(x), float(y)
         before = frames[-1]["idx"] + 1 if frames else before
+
+
+def read_team_colours(feed: Feed) -> dict[str, str]:
+    """ "home" and "away" -> "#RRGGBB", "" where the metadata has none."""
+    found = {"home": "", "away": ""}
+    if not feed.meta or feed.meta[0].stat().st_size > _LARGEST:
+        return found
+    said = feed.meta[0].read_text(encoding="utf-8", errors="replace")
+    for side in found:
+        match = re.search(_JSON_COLOUR.format(side=side), said)
+        found[side] = _colour(match[1]) if match else ""
+    for tag in _XML_TEAM.findall(said) if said.lstrip().startswith("<") else ():
+        shirt = _XML_SHIRT.search(tag)
+        side = "home" if 'Role="home"' in tag else "away" if re.search(r'Role="(guest|away)"', tag) else None
+        if shirt and side:
+            found[side] = _colour(shirt[1])
+    return found
+
+
+def _colour(said: str) -> str:
+    """ "#RRGGBB" in capitals, "" where it is no colour."""
+    match = _COLOUR.fullmatch(said.strip())
+    return f"#{match[1].upper()}" if match else ""

@@ -21,11 +21,19 @@ from ..tables import number, read_rows
 from ..whole import atomic_write
 from . import match_arrays
 from .feed import Feed
-from .match_checks import check_periods, check_players, check_rows, check_same_match, whole_lines
-from .match_repairs import mended_ball, mended_players, mended_sides, side_lines
+from .match_repairs import (
+    check_periods,
+    check_players,
+    check_rows,
+    check_same_match,
+    mended_ball,
+    mended_players,
+    mended_sides,
+    side_lines,
+    whole_lines,
+)
 from .providers import find_feed, load_tracking
-from .referees import described_referee, referee_samples
-from .team_colours import team_colours
+from .referees import described_referee, read_team_colours, referee_samples
 
 RATES = (5.0, 100.0)
 """Samples per second that a track may have."""
@@ -36,13 +44,11 @@ _ARRAYS = ("times", "positions", "ball", "players", "pitch", "periods", "teams",
 
 
 def read_track_csv(path: str | os.PathLike) -> Track:
-    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, other columns ignored, as the file
-    has it.
+    """One player and the ball from `time_s,x_m,y_m[,ball_x_m,ball_y_m,ball_z_m]`, others ignored, as the file has it.
 
     Empty cells (or nan) are unknown. Rows stay in the file's order, repeated times and gaps included:
     `motion.track.clean` puts that right and tells. InputError, with the line, for missing columns, cells that are no
-    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz.
-    """
+    number or beyond 10 km, fewer than two samples with a position, and rates outside 5 to 100 Hz."""
     rows = list(read_rows(path, ("time_s", "x_m", "y_m")))
     names = rows[0][1] if rows else {}
     player = _cells(rows, ("time_s", "x_m", "y_m"))
@@ -72,11 +78,8 @@ def _check_rate(track: Track, path) -> None:
 
 
 def read_match(
-    path: str | os.PathLike,
-    meta: str | os.PathLike | None = None,
-    provider: str | None = None,
-    cache_dir: str | os.PathLike | None = None,
-    pitch: tuple[float, float] | None = None,
+    path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
+    cache_dir: str | os.PathLike | None = None, pitch: tuple[float, float] | None = None,
 ) -> Match:
     """A provider's tracking file as arrays; the second time from a cache of them.
 
@@ -85,8 +88,7 @@ def read_match(
     `providers.PROVIDERS`; where None, guessed from the content. cache_dir: where arrays are kept, keyed by the content
     of all files; by default the user's cache folder. pitch: length and width in metres for feeds that have none
     (Metrica's CSV, Stats Perform), by default 105 x 68. What was guessed is in the match's notes, and all that was put
-    right in its report. InputError where files are missing, not of that form or not of one match, and where kloppy is
-    not installed.
+    right in its report. InputError where files are missing, not of that form or not of one match, and without kloppy.
     """
     feed, notes = find_feed(path, meta, provider)
     cache = _cache_folder(cache_dir) / f"{_key(feed, pitch)}.npz"
@@ -137,12 +139,8 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
     positions, ball, turned = mended_sides(times, positions, ball, spans, teams)
     turned += side_lines(times, positions, spans, teams, [one[4] for one in who])
     return {
-        "times": times,
-        "positions": positions,
-        "ball": ball,
-        "players": np.array(who, dtype=str).reshape(len(who), 5),
-        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]),
-        "periods": np.array(periods),
+        "times": times, "positions": positions, "ball": ball, "players": np.array(who, dtype=str).reshape(len(who), 5),
+        "pitch": np.array([length, width, guessed, float(dataset.metadata.frame_rate)]), "periods": np.array(periods),
         "teams": np.array(_teams(dataset, feed), dtype=str).reshape(-1, 3),
         "lines": np.array([*lines, *turned, *of_ball, *more, *of_referees], dtype=str),
     }
@@ -150,7 +148,7 @@ def _arrays(dataset, feed: Feed, pitch: tuple[float, float] | None, lines=()) ->
 
 def _teams(dataset, feed: Feed) -> list[tuple[str, str, str]]:
     """Ground, name and colour of the home and the away team."""
-    colours = team_colours(feed)
+    colours = read_team_colours(feed)
     names = {str(team.ground): str(team.name or "") for team in dataset.metadata.teams}
     return [(ground, names.get(ground, ""), colours[ground]) for ground in ("home", "away")]
 
@@ -164,16 +162,9 @@ def _match(arrays: dict[str, np.ndarray], feed: Feed, notes: list[str]) -> Match
     )
     referees = (Team(REFEREE, "referees"),) if any(player.team == REFEREE for player in players) else ()
     match = Match(
-        times=frozen_array(arrays["times"]),
-        players=players,
-        positions=frozen_array(arrays["positions"]),
-        ball=frozen_array(arrays["ball"]),
-        length=length,
-        width=width,
-        fps=fps,
-        provider=feed.provider.name,
-        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()),
-        notes=tuple(notes),
+        times=frozen_array(arrays["times"]), players=players, positions=frozen_array(arrays["positions"]),
+        ball=frozen_array(arrays["ball"]), length=length, width=width, fps=fps, provider=feed.provider.name,
+        periods=tuple((start, end) for start, end, _, _ in arrays["periods"].tolist()), notes=tuple(notes),
         teams=(*(Team(*team) for team in arrays["teams"].tolist()), *referees),
         passed=tuple((int(number), before) for _, _, number, before in arrays["periods"].tolist()),
     )

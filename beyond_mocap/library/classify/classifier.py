@@ -1,26 +1,142 @@
-"""A classifier of acts: what it proposes for a recording, beside what the rules do."""
+"""A classifier of acts: what it knows of each (how it looks, how sure that makes, where its moment lies, which words go
+with it), what it proposes for a recording beside what the rules do, and its file: one `.npz` of plain arrays and a
+header in JSON, never pickled, checked when it is read."""
 
 from __future__ import annotations
 
+import io
+import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
+from scipy.signal import find_peaks
 
 from ...annotation import LOCOMOTION, ClipAnnotation, swap_sides
+from ...base.errors import InputError
 from ...base.time_series import runs
+from ...files.whole import atomic_write
 from ...motion.motion import Motion
-from ..proposal import LEARNED, Proposal
-from . import confidence
-from .act import Act, candidates, in_space, rule_at, rule_sure, steady, struck
-from .signals import RATE, Signals, signals
-from .windows import Space
+from ..word_sources import LEARNED, Proposal
+from .details import Details
+from .kernel import Kernel, compute_confidence
+from .signals import LENGTH, RATE, STRIKES, Signals, Space, signals, windows
 
 LEAST = 0.2
 """Moments that are less sure than this are not proposed at all."""
 
 _APART = 0.35  # seconds between two moments, whatever they are: of two nearer ones the surer counts
 _SHORTEST = 0.3  # seconds of a stretch
+NEAR = 0.15  # seconds within which a rule's moment and a candidate are the same
+_CANDIDATES_APART = 10  # samples between two candidates
+_STEADY = 9  # samples over which a stretch's score is averaged
+_NOTHING = 0.01  # seconds: leads that are shorter are how somebody sets keys
+_AROUND = 0.12  # seconds around a candidate in which its strike is looked for
+
+_FILE_VERSION = 1
+FILE_NAME = "learned_words.npz"
+"""The file's name beside a library's cache."""
+
+_LARGEST = 256 * 1024 * 1024
+_NEXT = "learn from annotated clips again"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Act:
+    """word: what is done; moment: whether it has key moments, else it is a stretch. kernel: its looks; weights (3,): of
+    its confidence (`kernel.compute_confidence`). silent: what counts as the rules' confidence where they say nothing.
+    shown: by how many moments or seconds it was learned. strike: index of STRIKES whose peak tells the key frame, -1
+    for the score's own; lead: seconds from that peak to the key. before, after: seconds of a row around its key."""
+
+    word: str
+    moment: bool
+    kernel: Kernel
+    weights: np.ndarray
+    silent: float
+    shown: float
+    strike: int
+    lead: float
+    before: float
+    after: float
+    details: Details
+
+    def told(self) -> str:
+        """What it is and what it was learned from, for a person."""
+        return f"{self.word}: {self.shown:.0f} moments" if self.moment else f"{self.word}: {self.shown:.1f} s"
+
+
+def candidates(kernel: Kernel, rows: np.ndarray, seconds: np.ndarray, ruled: Sequence[Proposal], word: str):
+    """Samples (C,) at which an act may have its moment, and their scores (C,): peaks of the score, and where the rules
+    see one that has no peak near. rows (N, K): windows in their space; seconds (N,) of the samples."""
+    score = smoothed(kernel.scores(rows))
+    at = find_peaks(np.pad(score, 1, constant_values=-9.0), distance=_CANDIDATES_APART)[0] - 1
+    for time in rule_moments(ruled, word):
+        if not np.any(np.abs(seconds[at] - time) <= NEAR):
+            at = np.append(at, np.argmin(np.abs(seconds - time)))
+    return np.sort(at), score[np.sort(at)]
+
+
+def smoothed(score: np.ndarray) -> np.ndarray:
+    """(N,) the score without what lasts a single sample."""
+    padded = np.pad(score, 1, mode="edge")
+    return 0.25 * padded[:-2] + 0.5 * padded[1:-1] + 0.25 * padded[2:]
+
+
+def steady(score: np.ndarray) -> np.ndarray:
+    """(N,) a stretch's score over a third of a second."""
+    return uniform_filter1d(score, _STEADY, mode="nearest") if len(score) else score
+
+
+def rule_moments(ruled: Sequence[Proposal], word: str) -> list[float]:
+    """Seconds of the key moments that the rules see of an act; `ruled` has seconds for frames (`in_seconds`)."""
+    return [one.annotation.key for one in ruled if one.annotation.key is not None and word in one.annotation.words]
+
+
+def rule_at(ruled: Sequence[Proposal], word: str, moment: bool, time: float) -> Proposal | None:
+    """What the rules say of an act at a time in seconds: the surest; None where they say nothing."""
+    there = [one for one in ruled if word in one.annotation.words and (one.annotation.key is not None) == moment]
+    if moment:
+        there = [one for one in there if abs(one.annotation.key - time) <= NEAR]
+    else:
+        there = [one for one in there if one.annotation.start <= time <= one.annotation.end]
+    return max(there, key=lambda one: one.confidence, default=None)
+
+
+def rule_sure(ruled: Sequence[Proposal], word: str, moment: bool, seconds: np.ndarray, silent: float) -> np.ndarray:
+    """(N,) confidence of the rules at each of the times, `silent` where they say nothing."""
+    found = (rule_at(ruled, word, moment, time) for time in seconds)
+    return np.array([silent if one is None else one.confidence for one in found])
+
+
+def struck(signals: Signals, strike: int, time: float) -> float:
+    """Seconds of the strike's peak within a few frames of a time; the time itself where there is none."""
+    fps = signals.fps
+    first = max(0, int(np.ceil((time - _AROUND) * fps)))
+    part = signals.strikes[first : int((time + _AROUND) * fps) + 1, strike]
+    if strike < 0 or len(part) < 3:
+        return time
+    return (first + int(np.argmax(part))) / fps
+
+
+def strike_of(signals: Sequence[tuple[Signals, float]]) -> tuple[int, float]:
+    """Which strike peaks most steadily near the key moments of an act (its signals, its second), and the seconds by
+    which the key comes after it; -1 where none is steady to two samples."""
+    best = (2.0 / RATE, -1, 0.0)
+    for strike in range(len(STRIKES)):
+        late = np.array([time - struck(one, strike, time) for one, time in signals])
+        lead = float(np.median(late))
+        lead = lead if abs(lead) > _NOTHING else 0.0
+        off = float(np.mean(np.abs(late - lead)))
+        best = min(best, (off, strike, lead))
+    return best[1], best[2]
+
+
+def in_space(signals: Signals, space: Space) -> np.ndarray:
+    """(N, K) the windows of signals."""
+    return space.within(windows(signals))
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +181,7 @@ def in_seconds(ruled: Sequence[Proposal], fps: float, mirrored: bool = False) ->
 def _moments(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
     """The key moments of one act."""
     at, score = candidates(act.kernel, rows, seconds, told, act.word)
-    sure = confidence.sure(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
+    sure = compute_confidence(act.weights, score, rule_sure(told, act.word, True, seconds[at], act.silent))
     likely = [(sample, float(how)) for sample, how in zip(at, sure) if how >= LEAST]
     return [_moment(act, seen, rows, seconds=seconds, told=told, sample=sample, sure=how) for sample, how in likely]
 
@@ -84,7 +200,7 @@ def _stretches(act: Act, seen: Signals, rows, seconds, told) -> list[Proposal]:
     """The stretches of one act."""
     score = steady(act.kernel.scores(rows))
     rule = rule_sure(told, act.word, False, seconds, act.silent)
-    sure = confidence.sure(act.weights, score, rule)
+    sure = compute_confidence(act.weights, score, rule)
     out = []
     for start, stop in runs(sure >= 0.5):
         if stop - start >= _SHORTEST * RATE:
@@ -111,3 +227,102 @@ def _surest(found: list[Proposal], fps: float) -> list[Proposal]:
         if all(abs(one.annotation.key - other.annotation.key) > _APART * fps for other in kept):
             kept.append(one)
     return kept
+
+
+def write_classifier(path: str | os.PathLike, known: Classifier) -> None:
+    """Writes a classifier whole; InputError where it cannot be written."""
+    arrays = {"mean": known.space.mean, "scale": known.space.scale, "basis": known.space.basis}
+    for number, act in enumerate(known.acts):
+        arrays[f"{number}.supports"], arrays[f"{number}.weights"] = act.kernel.supports, act.kernel.weights
+        arrays[f"{number}.sure"] = act.weights
+        for group, plane in enumerate(act.details.planes):
+            arrays[f"{number}.plane.{group}"] = plane
+    header = {"version": _FILE_VERSION, "clips": known.clips, "acts": [_describe_act(act) for act in known.acts]}
+    arrays["header"] = np.frombuffer(json.dumps(header).encode(), np.uint8)
+    out = io.BytesIO()
+    np.savez_compressed(out, **arrays)
+    atomic_write(path, out.getvalue())
+
+
+def read_classifier(path: str | os.PathLike) -> Classifier:
+    """The classifier in a file; InputError where it is missing, damaged, or of another version."""
+    path = Path(path)
+    try:
+        if path.stat().st_size > _LARGEST:
+            raise InputError(path, "more than 256 MiB", "a file of learned words", _NEXT)
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        header = json.loads(arrays["header"].tobytes())
+        version = header["version"]
+    except InputError:
+        raise
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "a file of learned words", _NEXT) from None
+    except Exception:  # a damaged file can fail in any of zipfile's, numpy's and json's own ways
+        raise InputError(path, "a file that cannot be read", "a file of learned words", _NEXT) from None
+    if version != _FILE_VERSION:
+        raise InputError(path, f"version {version!r}", f"version {_FILE_VERSION}", _NEXT)
+    try:
+        return _restore_classifier(header, arrays)
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
+        raise InputError(path, "numbers that do not belong together", "a file of learned words", _NEXT) from None
+
+
+def _describe_act(act: Act) -> dict:
+    return {
+        "word": act.word, "moment": act.moment, "shift": act.kernel.shift, "gamma": act.kernel.gamma,
+        "silent": act.silent, "shown": act.shown, "strike": act.strike, "lead": act.lead,
+        "before": act.before, "after": act.after,
+        "choices": act.details.choices, "by_rule": act.details.by_rule,
+    }
+
+
+def _restore_classifier(header: dict, arrays: dict) -> Classifier:
+    """ValueError where a shape or number is out of order."""
+    components = arrays["basis"].shape[1]
+    mean, scale = _check_array(arrays, "mean", (LENGTH,)), _check_array(arrays, "scale", (LENGTH,))
+    space = Space(mean, scale, _check_array(arrays, "basis", (LENGTH, components)))
+    if np.any(scale <= 0.0) or not header["acts"]:
+        raise ValueError("scale")
+    acts = tuple(_restore_act(number, one, arrays, components) for number, one in enumerate(header["acts"]))
+    return Classifier(space, acts, int(header["clips"]))
+
+
+def _restore_act(number: int, header: dict, arrays: dict, components: int) -> Act:
+    count = len(arrays[f"{number}.weights"])
+    if not count or not _check_word(header["word"]):
+        raise ValueError("act")
+    supports = _check_array(arrays, f"{number}.supports", (count, components))
+    kernel = Kernel(supports, _check_array(arrays, f"{number}.weights", (count,)), _check_number(header["shift"]),
+                    _check_number(header["gamma"], least=0.0))
+    choices = tuple(tuple(_check_word(word) for word in group) for group in header["choices"])
+    planes = tuple(_check_array(arrays, f"{number}.plane.{group}", (len(words), components + 1))
+                   for group, words in enumerate(choices))
+    by_rule = tuple(bool(one) for one in header["by_rule"])
+    strike = int(header["strike"])
+    if len(by_rule) != len(choices) or not -1 <= strike < len(STRIKES) or not all(choices):
+        raise ValueError("header")
+    before, after = (_check_number(header[name], least=0.0) for name in ("before", "after"))
+    return Act(word=_check_word(header["word"]), moment=bool(header["moment"]), kernel=kernel,
+               weights=_check_array(arrays, f"{number}.sure", (3,)), silent=_check_number(header["silent"]),
+               shown=_check_number(header["shown"]), strike=strike, lead=_check_number(header["lead"]), before=before,
+               after=after, details=Details(choices, planes, by_rule))
+
+
+def _check_array(arrays: dict, name: str, shape: tuple[int, ...]) -> np.ndarray:
+    found = arrays[name]
+    if found.shape != shape or found.dtype.kind != "f" or not np.all(np.isfinite(found)):
+        raise ValueError(name)
+    return found
+
+
+def _check_number(value, least: float = -1e6) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not least <= value < 1e6:
+        raise ValueError("number")
+    return float(value)
+
+
+def _check_word(value) -> str:
+    if not isinstance(value, str) or any(not (letter.isalnum() or letter in "_-") for letter in value):
+        raise ValueError("word")
+    return value

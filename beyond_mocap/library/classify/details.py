@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...annotation.labels import GROUPS, list_labels
-from ..proposal import Proposal
+from ..word_sources import Proposal
 
 EXCLUSIVE = tuple(list_labels(group=group) for group in GROUPS)
 """Words of which an act has one at most; any other word is there or not."""
@@ -41,7 +41,7 @@ class Details:
         return tuple(word for word in found if word)
 
 
-def fitted(
+def fit_details(
     rows: np.ndarray, words: Sequence[tuple[str, ...]], ruled: Sequence[Proposal | None], clip: np.ndarray
 ) -> Details:
     """From windows in their space (N, K), the words beside the act that each shows, what the rules say there, and the

@@ -13,9 +13,8 @@ from ...annotation.labels import list_labels
 from ...base.errors import Cancelled, InputError
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
-from ..proposal import Proposal
 from ..proposals import GAITS, propose
-from ..word_sources import is_open
+from ..word_sources import Proposal, is_open
 from .signals import Signals, signals
 
 _COLOURS = frozenset((*LOCOMOTION, *VOCABULARY["modifier"], *list_labels(group="height")))

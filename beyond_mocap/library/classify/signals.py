@@ -1,4 +1,5 @@
-"""A recording as signals that no longer tell whose body it is: at one rate, in the facing frame, in lengths of a leg.
+"""A recording as signals that no longer tell whose body it is: at one rate, in the facing frame, in lengths of a leg;
+and what one moment of them looks like, as one row of numbers.
 
 Positions and velocities of twelve points that every humanoid has, the pelvis's height, speed and turning, and the
 trunk's lean. The mirrored body's signals come from these by exchanging sides, so that one example teaches both.
@@ -29,6 +30,12 @@ STRIKES = ("foot", "hand", "head", "pelvis up", "pelvis down")
 """What has a peak at the recording's own rate where something is struck, caught or cleared: the faster foot's and the
 faster hand's speed, the head's forward against the chest, the pelvis's height and its negative."""
 
+OFFSETS = np.array([-18, -12, -8, -5, -3, -1, 0, 1, 3, 5, 8, 12, 18])
+"""Samples (1/30 s) around a moment that its window looks at: close ones near it, 0.6 s to both sides."""
+
+LENGTH = 13 * 80
+"""Numbers of a window."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Signals:
@@ -37,8 +44,7 @@ class Signals:
     fps: the recording's own rate; count: its frames. frames (N,): the fractional frames of N samples at RATE.
     middle (N, 2, 6), paired (N, 2, 5, 6): of each point (MIDDLE; left and right PAIRED) place against the pelvis and
     velocity times 0.12 s, x forward, y left, z up, in legs. trunk (N, 8): pelvis's height in legs, its velocity in
-    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m.
-    """
+    m/s (forward, left, up), turning in rad/s, the trunk's direction (3). strikes (count, 5): STRIKES in m/s and m."""
 
     fps: float
     count: int
@@ -118,3 +124,33 @@ def _velocity(places: np.ndarray, fps: float) -> np.ndarray:
     if len(places) < 2:
         return np.zeros_like(places)
     return np.gradient(gaussian_filter1d(places, max(_SMOOTH * fps, 0.5), axis=0, mode="nearest"), axis=0) * fps
+
+
+def windows(signals: Signals) -> np.ndarray:
+    """(N, LENGTH) one row a sample; before the first and after the last sample these are held."""
+    count = len(signals)
+    flat = np.concatenate([part.reshape(count, -1) for part in (signals.middle, signals.paired, signals.trunk)], axis=1)
+    around = np.clip(np.arange(count)[:, None] + OFFSETS, 0, count - 1)
+    return flat[around].reshape(count, -1)
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """Windows reduced to their principal components. mean, scale (LENGTH,): of each; basis (LENGTH, K)."""
+
+    mean: np.ndarray
+    scale: np.ndarray
+    basis: np.ndarray
+
+    @classmethod
+    def of(cls, rows: np.ndarray, components: int) -> "Space":
+        """The space of windows (N, LENGTH), in at most so many components."""
+        mean, scale = rows.mean(axis=0), np.maximum(rows.std(axis=0), 1e-6)
+        unit = (rows - mean) / scale
+        _, vectors = np.linalg.eigh(unit.T @ unit)
+        kept = min(components, len(rows))
+        return cls(mean, scale, vectors[:, ::-1][:, :kept].astype(np.float32))
+
+    def within(self, rows: np.ndarray) -> np.ndarray:
+        """(N, K) windows (N, LENGTH) in it, of unit variance in all."""
+        return (rows - self.mean) / self.scale @ self.basis / np.sqrt(self.basis.shape[0])

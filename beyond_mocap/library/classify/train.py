@@ -14,12 +14,12 @@ import numpy as np
 from ...annotation import swap_sides
 from ...annotation.labels import find_label
 from ...base.errors import InputError
-from ..proposal import Proposal
-from . import confidence, details, kernel
-from .act import Act, candidates, in_space, rule_at, rule_sure, steady, strike_of
-from .classifier import Classifier, in_seconds
+from ..word_sources import Proposal
+from .classifier import Act, Classifier, candidates, in_seconds, in_space, rule_at, rule_sure, steady, strike_of
+from .details import Details, fit_details
 from .examples import Example, act_of
-from .windows import Space, windows
+from .kernel import Kernel, compute_confidence, fit_confidence, fit_kernel, weigh_silence
+from .signals import Space, windows
 
 _COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # of a window; of the clips; windows that are no act, for one act
 _KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds: an act's moment; where it is neither; the same of a stretch's ends
@@ -44,8 +44,7 @@ class _Side:
 def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Classifier:
     """A classifier of all acts that at least two moments or one second of stretches show.
 
-    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough.
-    """
+    progress(fraction, text); cancelled(). The same examples give the same bits. InputError where no act has enough."""
     from threadpoolctl import threadpool_limits
 
     from ...base.errors import Cancelled
@@ -74,7 +73,7 @@ def trained(examples: Sequence[Example], progress=None, cancelled=None) -> Class
 
 def _space(examples: Sequence[Example]) -> Space:
     """The space of the windows of all clips, of evenly spaced ones where they are too many."""
-    sides = [side for one in examples for side in _sides(one)]
+    sides = [side for one in examples for side in (one.signals, one.signals.mirrored)]
     step = max(1, -(-sum(map(len, sides)) // _WINDOWS))
     return Space.of(np.concatenate([windows(side)[::step] for side in sides]), _COMPONENTS)
 
@@ -89,10 +88,6 @@ def _acts(examples: Sequence[Example]) -> dict[tuple[str, bool], float]:
             length = 1.0 if moment else (row.end - row.start) / one.signals.fps
             found[kind] = found.get(kind, 0.0) + length
     return {kind: shown for kind, shown in sorted(found.items()) if kind[0] and shown >= (2.0 if kind[1] else 1.0)}
-
-
-def _sides(example: Example):
-    return example.signals, example.signals.mirrored
 
 
 def _twins(example: Example, space: Space) -> list[_Side]:
@@ -113,7 +108,7 @@ def _act(word: str, moment: bool, sides: list[_Side]) -> Act | None:
     silent = _silent(word, moment, sides)
     score, rule, shown = _unseen(word, moment, sides, silent)
     ruled = any(word in one.annotation.words for side in sides for one in side.ruled)
-    weights = confidence.calibrated(score, rule, shown, ruled)
+    weights = fit_confidence(score, rule, shown, ruled)
     if looks is None or (ruled and not moment and not _better(weights, score, rule, shown)):
         return None
     beside = _details(word, moment, sides)
@@ -145,7 +140,7 @@ def _labels(side: _Side, word: str, moment: bool) -> np.ndarray:
     return out
 
 
-def _kernel(word: str, moment: bool, sides: list[_Side]) -> kernel.Kernel | None:
+def _kernel(word: str, moment: bool, sides: list[_Side]) -> Kernel | None:
     """The looks of an act; None where these sides show none."""
     if not sides:
         return None
@@ -154,7 +149,7 @@ def _kernel(word: str, moment: bool, sides: list[_Side]) -> kernel.Kernel | None
     kept = np.concatenate([_thinned(np.flatnonzero(labels == 1)), _thinned(np.flatnonzero(labels == 0))])
     if len(set(labels[kept])) < 2:
         return None
-    return kernel.fitted(rows[kept], labels[kept] == 1)
+    return fit_kernel(rows[kept], labels[kept] == 1)
 
 
 def _thinned(which: np.ndarray) -> np.ndarray:
@@ -165,7 +160,7 @@ def _thinned(which: np.ndarray) -> np.ndarray:
 
 def _better(weights: np.ndarray, score: np.ndarray, rule: np.ndarray, shown: np.ndarray) -> bool:
     """Whether score and rules together tell an act better, by F1, than the rules do alone."""
-    ours, theirs = confidence.sure(weights, score, rule) >= 0.5, rule > 0.0
+    ours, theirs = compute_confidence(weights, score, rule) >= 0.5, rule > 0.0
     f1 = [2.0 * np.sum(said & shown) / max(np.sum(said) + np.sum(shown), 1) for said in (ours, theirs)]
     return bool(f1[0] > f1[1] + _MARGIN)
 
@@ -177,12 +172,11 @@ def _silent(word: str, moment: bool, sides: list[_Side]) -> float:
         for row in side.example.rows_of(word, moment):
             middle = row.key if row.key is not None else 0.5 * (row.start + row.end)
             found.append(rule_at(side.ruled, word, moment, middle / side.example.signals.fps) is not None)
-    return -confidence.silence(sum(found) // 2, len(found) // 2)
+    return -weigh_silence(sum(found) // 2, len(found) // 2)
 
 
 def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple[np.ndarray, ...]:
-    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that had not seen their
-    clips."""
+    """Scores, the rules' confidences and the truth (C,) of all candidates, from kernels that never saw their clips."""
     names = list(dict.fromkeys(side.example.name for side in sides))
     parts: list[tuple[np.ndarray, ...]] = [(np.zeros(0), np.zeros(0), np.zeros(0, bool))]
     for fold in range(min(_FOLDS, len(names))):
@@ -194,7 +188,7 @@ def _unseen(word: str, moment: bool, sides: list[_Side], silent: float) -> tuple
     return tuple(np.concatenate(column) for column in zip(*parts))
 
 
-def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool, silent: float) -> tuple[np.ndarray, ...]:
+def _seen(looks: Kernel, side: _Side, word: str, moment: bool, silent: float) -> tuple[np.ndarray, ...]:
     """Scores, the rules' confidences and the truth (C,) of one clip's candidates."""
     if moment:
         at, score = candidates(looks, side.rows, side.seconds, side.ruled, word)
@@ -212,7 +206,7 @@ def _seen(looks: kernel.Kernel, side: _Side, word: str, moment: bool, silent: fl
     return score, rule_sure(side.ruled, word, moment, side.seconds[at], silent), shown
 
 
-def _details(word: str, moment: bool, sides: list[_Side]) -> details.Details:
+def _details(word: str, moment: bool, sides: list[_Side]) -> Details:
     """The words beside the act."""
     rows, words, ruled, clips = [], [], [], []
     names = {name: number for number, name in enumerate(dict.fromkeys(side.example.name for side in sides))}
@@ -230,4 +224,4 @@ def _details(word: str, moment: bool, sides: list[_Side]) -> details.Details:
             words += [tuple(other for other in said if other != word)] * len(at)
             ruled += [rule_at(side.ruled, word, moment, float(time)) for time in side.seconds[at]]
             clips += [names[side.example.name]] * len(at)
-    return details.fitted(np.concatenate(rows), words, ruled, np.array(clips))
+    return fit_details(np.concatenate(rows), words, ruled, np.array(clips))

@@ -20,8 +20,8 @@ from ...base.errors import InputError
 from ...base.time_series import runs
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
+from ...motion.limb import bent_limb
 from ...motion.motion import Motion, pose_kinematics
-from ...motion.reach import bent_limb
 
 WINDOW, STILL, EASE, APART = 0.5, 0.0015, 0.1, 0.01
 """Seconds (his 100 frames, at his 200 per second), metres between the halves' means, seconds of easing in and out, and

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...base.errors import InputError, TimedLine, spans_of
 from ...files.whole import atomic_write
-from ...library.chosen import with_chosen_gaits
+from ...library.automatic import with_chosen_gaits
 from ...library.features import FPS
 from ...library.library import Library
 from ...synthesis.plan import Plan

@@ -102,8 +102,7 @@ def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _solved(powers: np.ndarray, speeds: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """x (N,) in [-1, 1] at which rising polynomials (K, N) reach `wanted` (N,): Newton, by halves where it leaps
-    out."""
+    """x (N,) in [-1, 1] at which rising polynomials (K, N) reach `wanted` (N,): Newton, else by halves."""
     low, high = np.full(len(wanted), -1.0), np.ones(len(wanted))
     whole = powers.sum(axis=0)
     x = np.clip(2.0 * wanted / np.where(whole > 0.0, whole, 1.0) - 1.0, -1.0, 1.0)

@@ -21,16 +21,14 @@ class Path:
 
     domain: its first and last parameter. breaks: (K,) rising parameters, the domain's ends among them, between which it
     is one polynomial. closed: whether it ends where it begins; then parameters beyond the domain go round, else they
-    are taken to its ends.
-    """
+    are taken to its ends."""
 
     domain: tuple[float, float]
     breaks: np.ndarray
     closed: bool = False
 
     def at(self, u: np.ndarray, derivative: int = 0) -> np.ndarray:
-        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... how they change with the
-        parameter."""
+        """Places (N, 3) in metres at parameters u (N,); with `derivative` 1, 2, ... their change with it."""
         raise NotImplementedError
 
     def _inside(self, u: np.ndarray) -> np.ndarray:
@@ -44,8 +42,7 @@ class Path:
 class PolynomialPath(Path):
     """One polynomial over the whole domain, as a series of Legendre polynomials, which keeps high degrees exact.
 
-    coefficients: (degree + 1, 3) metres. domain: see Path.
-    """
+    coefficients: (degree + 1, 3) metres. domain: see Path."""
 
     coefficients: np.ndarray
     domain: tuple[float, float]
@@ -70,9 +67,7 @@ class SplinePath(Path):
     """A B-spline.
 
     knots: (P + degree + 1,) not falling. coefficients: (P, 3) metres, its control points. degree: at least 1 (below 3
-    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` control points repeat the
-    first.
-    """
+    it is less smooth than a Path is to be: what a user asks for). closed: the last `degree` points repeat the first."""
 
     knots: np.ndarray
     coefficients: np.ndarray

@@ -16,8 +16,7 @@ class Terrain:
     """A mesh to stand on. Walls are no ground, bridges are: every surface counts, whichever way its normal points."""
 
     def __init__(self, vertices: np.ndarray, triangles: np.ndarray):
-        """`vertices`: (V, 3) metres. `triangles`: (F, 3) vertices each. InputError where they do not belong
-        together."""
+        """`vertices`: (V, 3) metres. `triangles`: (F, 3) vertices each. InputError where they do not fit."""
         corners = _corners(vertices, triangles)
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         size = np.linalg.norm(normals, axis=1)
@@ -31,11 +30,9 @@ class Terrain:
         self._sort(corners[:, :, :2].min(axis=1), corners[:, :, :2].max(axis=1))
 
     def heights(self, places: np.ndarray, below: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The highest ground not above `below` (N,) metres at places (N, 2): heights (N,) and unit normals (N, 3),
-        upwards.
+        """The highest ground not above `below` (N,) metres at places (N, 2): heights (N,), unit normals (N, 3) up.
 
-        NaN where there is none.
-        """
+        NaN where there is none."""
         places, below = np.asarray(places, dtype=float), np.asarray(below, dtype=float)
         asked, triangle = self._candidates(places)
         shares = np.einsum("pi,pij->pj", places[asked] - self._first[triangle, :2], self._inverse[triangle])

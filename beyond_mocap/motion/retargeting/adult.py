@@ -1,5 +1,4 @@
-"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging in the rest
-pose.
+"""The project's own body: an adult of 1.80 m in 22 joints, named as Mixamo and LAFAN1 do, arms hanging at rest.
 
 Segment lengths are shares of the stature H after Drillis and Contini 1966 as printed in Winter 2009 ("Biomechanics and
 motor control of human movement", fig. 4.1): thigh .245 H, shank .246 H, ankle .039 H, upper arm .186 H, forearm .146 H,
@@ -14,23 +13,15 @@ from ..skeleton import Skeleton
 
 # joint, parent, offset in thousandths of the stature (forward, left, up); limbs are given for the left side
 _CENTRE = (
-    ("Hips", None, (0, 0, 0)),
-    ("Spine", "Hips", (-3, 0, 48)),
-    ("Spine1", "Spine", (4, 0, 72)),
-    ("Spine2", "Spine1", (-5, 0, 75)),
-    ("Neck", "Spine2", (-6, 0, 118)),
-    ("Head", "Neck", (11, 0, 52)),
+    ("Hips", None, (0, 0, 0)), ("Spine", "Hips", (-3, 0, 48)), ("Spine1", "Spine", (4, 0, 72)),
+    ("Spine2", "Spine1", (-5, 0, 75)), ("Neck", "Spine2", (-6, 0, 118)), ("Head", "Neck", (11, 0, 52)),
 )
 _ARM = (
-    ("Shoulder", "Spine2", (2, 14, 84)),
-    ("Arm", "Shoulder", (-12, 91, -10)),
-    ("ForeArm", "Arm", (0, 0, -170)),
+    ("Shoulder", "Spine2", (2, 14, 84)), ("Arm", "Shoulder", (-12, 91, -10)), ("ForeArm", "Arm", (0, 0, -170)),
     ("Hand", "ForeArm", (0, 0, -146)),
 )
 _LEG = (
-    ("UpLeg", "Hips", (0, 50, -22)),
-    ("Leg", "UpLeg", (0, 0, -242)),
-    ("Foot", "Leg", (0, 0, -243)),
+    ("UpLeg", "Hips", (0, 50, -22)), ("Leg", "UpLeg", (0, 0, -242)), ("Foot", "Leg", (0, 0, -243)),
     ("ToeBase", "Foot", (74, 0, -30)),
 )
 _CENTRE_TIPS = (("Head", (10, 0, 125)),)

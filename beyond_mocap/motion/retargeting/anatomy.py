@@ -4,8 +4,7 @@ Rest poses and axes of rigs differ (CMU's legs splay, LAFAN1's limbs all lie alo
 is the same in all of them is the body: a thigh runs from hip to knee and its knee bends backward about one axis. For
 each joint j we look for the anatomical frame F_j: the rotation whose columns are the segment's forward, left and up
 directions in the joint's own axes when the body stands upright, facing +X, arms hanging. Then W_j F_j, with W_j the
-joint's rotation in the world, is how the *segment* is turned, in words that hold for every skeleton, and no rest pose
-occurs in it.
+joint's rotation in the world, is how the *segment* is turned, in words that hold for any skeleton, without rest poses.
 
 Directions along bones and between hips are known from the offsets alone. What they leave open comes from recorded
 frames: knees and elbows are hinges, so thigh x shank is the knee's axis wherever it bends; a sole is level while the
@@ -25,6 +24,7 @@ from .. import quaternion
 from ..humanoid import Humanoid, Limb
 from ..motion import Motion, pose_kinematics
 from ..skeleton import Skeleton, frozen_array
+from .structure import list_between
 
 _UP = np.array([0.0, 0.0, 1.0])
 _LEFT = np.array([0.0, 1.0, 0.0])
@@ -47,8 +47,7 @@ class Anatomy:
 
     axes (J, 4): F_j as quaternions, for the joints in `known`; the identity for others. still (J, 4): mean local
     rotations, for joints without a meaning. leg: thigh plus shank, metres. ankle: its height over the ground when the
-    foot is flat, metres. ball: the toe joint's height then.
-    """
+    foot is flat, metres. ball: the toe joint's height then."""
 
     skeleton: Skeleton
     body: Humanoid
@@ -61,8 +60,7 @@ class Anatomy:
 
 
 def spine_shares(skeleton: Skeleton, body: Humanoid) -> np.ndarray:
-    """How far along the trunk each joint of `body.spine` turns: (S,), the pelvis at 0, the chest at 1, by arc
-    length."""
+    """How far along the trunk each joint of `body.spine` turns: (S,), pelvis 0, chest 1, by arc length."""
     if not body.spine:
         return np.zeros(0)
     top = next((joint for joint in (body.neck, body.head) if joint is not None), None)
@@ -77,11 +75,7 @@ def head_chain(skeleton: Skeleton, body: Humanoid) -> tuple[int, ...]:
     """The joints from neck to head, from below; one or none where the body lacks them."""
     if body.head is None or body.neck is None:
         return tuple(joint for joint in (body.neck, body.head) if joint is not None)
-    chain, joint = [body.head], skeleton.parents[body.head]
-    while joint >= 0 and joint != body.neck:
-        chain.append(joint)
-        joint = skeleton.parents[joint]
-    return (body.neck, *chain[::-1]) if joint == body.neck else (body.neck, body.head)
+    return (body.neck, *list_between(skeleton.parents, body.neck, body.head), body.head)
 
 
 def study(
@@ -90,8 +84,7 @@ def study(
     """The anatomy of `skeleton`, whose joints mean what `body` says.
 
     example: a recording on it (its bones' lengths are not looked at); without one the rest pose is taken. standing (T,
-    2) bool: which foot of the example stands; without it feet count as standing where they are low.
-    """
+    2) bool: which foot of the example stands; without it feet count as standing where they are low."""
     return _Study(skeleton, body, example, standing).anatomy()
 
 
@@ -215,8 +208,7 @@ class _Study:
             self.settle(limb.hand, -fingers, self.mean(limb.hand, self.direction(limb.lower_arm, 1)))
 
     def _collar(self, limb: Limb) -> None:
-        """A collar bone is as it is held on the mean; sideways where that is no way to hold it (folded-up rest
-        poses)."""
+        """A collar bone is as it is held on the mean; sideways where that cannot be (folded-up rest poses)."""
         self.follow(limb.shoulder, self.segment(self.body.chest))
         neutral = quaternion.inverse(self.axes[limb.shoulder])
         held = unit_vectors(quaternion.rotate(neutral, self._bone(limb.shoulder, limb.upper_arm)), _UP)
@@ -237,8 +229,7 @@ class _Study:
         self.settle(limb.lower_leg, -self._bone(limb.lower_leg, limb.foot), self.mean(limb.lower_leg, hinge + beside))
 
     def _bone(self, joint: int, child: int) -> np.ndarray:
-        """From `joint` to a joint below it, in the first one's axes, metres: (3,); on the mean where others lie
-        between."""
+        """From `joint` to a joint below it, in the first one's axes, metres: (3,); on the mean over joints between."""
         if self.skeleton.parents[child] == joint:
             return self.skeleton.offsets[child]
         return self.mean(joint, self.places[:, child] - self.places[:, joint])
@@ -307,15 +298,12 @@ class _Study:
 
 def _tip(skeleton: Skeleton, joint: int) -> np.ndarray | None:
     """The joint's end site (3,) metres, None where it has none or one of no length."""
-    if joint not in skeleton.end_parents:
-        return None
-    offset = skeleton.end_offsets[skeleton.end_parents.index(joint)]
+    offset = skeleton.tip(joint)
     return offset if np.linalg.norm(offset) > 1e-3 else None
 
 
 def _fingers(skeleton: Skeleton, hand: int) -> np.ndarray | None:
-    """Where the hand's fingers begin, on the mean, in its axes; its tip where it has none; None where nothing is
-    known."""
+    """Where the hand's fingers begin, on the mean, in its axes; its tip where it has none; None without either."""
     offsets = skeleton.offsets[list(skeleton.children(hand))].reshape(-1, 3)
     mean = offsets.mean(axis=0) if len(offsets) else np.zeros(3)
     return mean if np.linalg.norm(mean) > 1e-3 else _tip(skeleton, hand)
@@ -323,10 +311,7 @@ def _fingers(skeleton: Skeleton, hand: int) -> np.ndarray | None:
 
 def _mean_rotation(rotations: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """The weighted mean (4,) of rotations (T, 4): the eigenvector of sum w q q^T (Markley et al. 2007)."""
-    return _positive(np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1])
-
-
-def _positive(q: np.ndarray) -> np.ndarray:
+    q = np.linalg.eigh(np.einsum("t,ti,tj->ij", weight, rotations, rotations))[1][:, -1]
     return q if q[0] >= 0.0 else -q
 
 

@@ -1,8 +1,7 @@
 """The neutral stance of any humanoid skeleton: upright, facing +X, legs straight down, arms hanging, soles flat.
 
 Skeletons rest in all kinds of poses (CMU's legs splay, LAFAN1's limbs all lie along X, Mixamo stands in a T). Whatever
-is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all of
-them."""
+is said in anatomical terms ("thigh 20 degrees forward") is said relative to this one stance, so it holds for all."""
 
 from __future__ import annotations
 
@@ -114,9 +113,7 @@ def _uprightness(body: Humanoid, places: np.ndarray) -> np.ndarray:
     score = np.zeros(len(places))
     for limb in (body.left, body.right):
         for high, low in (
-            (limb.upper_leg, limb.lower_leg),
-            (limb.lower_leg, limb.foot),
-            (limb.upper_arm, limb.lower_arm),
+            (limb.upper_leg, limb.lower_leg), (limb.lower_leg, limb.foot), (limb.upper_arm, limb.lower_arm)
         ):
             if high is not None and low is not None:
                 score += unit_vectors(places[:, low] - places[:, high], _DOWN) @ _DOWN
@@ -142,8 +139,7 @@ def _sole_slope(skeleton: Skeleton, limb: Limb, world: np.ndarray, example: Moti
     """How steeply, radians, the line from ankle to toe joint falls while the sole is flat.
 
     In the example: where the ankle is in its lowest quarter. Else as the skeleton rests, or a usual slope where that is
-    no standing foot.
-    """
+    no standing foot."""
     if example is not None and limb.toe is not None:
         places, _ = forward_kinematics(example)
         ankle = places[:, limb.foot]
@@ -165,18 +161,14 @@ def _flatten_foot(skeleton: Skeleton, world: np.ndarray, limb: Limb, slope: floa
 
 
 def _has_tip(skeleton: Skeleton, joint: int) -> bool:
-    return joint in skeleton.end_parents and bool(np.linalg.norm(_tip(skeleton, joint)) > 1e-4)
-
-
-def _tip(skeleton: Skeleton, joint: int) -> np.ndarray:
-    return skeleton.end_offsets[skeleton.end_parents.index(joint)]
+    return bool(np.linalg.norm(skeleton.tip(joint)) > 1e-4)
 
 
 def _direction(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None) -> np.ndarray:
     """World direction (3,) of the bone from `joint` to `child` (or to its tip, or its parent's bone going on)."""
     if child is not None:
         return unit_vectors(_world_offset(skeleton, world, joint, child), _DOWN)
-    offset = _tip(skeleton, joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
+    offset = skeleton.tip(joint) if _has_tip(skeleton, joint) else skeleton.offsets[joint]
     return unit_vectors(quaternion.rotate(world[joint], offset), _DOWN)
 
 
@@ -212,23 +204,15 @@ def _measure(skeleton: Skeleton, body: Humanoid, world: np.ndarray, places: np.n
     ]
     leg = float(np.mean(legs))
     ball = np.array([_ball(places, limb, leg) for limb in limbs])
-    tips = [
-        np.linalg.norm(_tip(skeleton, limb.toe))
-        for limb in limbs
-        if limb.toe is not None and _has_tip(skeleton, limb.toe)
-    ]
+    toes = [limb.toe for limb in limbs if limb.toe is not None and _has_tip(skeleton, limb.toe)]
+    tips = [np.linalg.norm(skeleton.tip(toe)) for toe in toes]
     middle = 0.5 * (places[body.left.upper_leg] + places[body.right.upper_leg])
     ankle_height = float(np.mean(-ball[:, 2])) + _BALL_HEIGHT * leg
     ground = np.mean([places[limb.foot, 2] for limb in limbs]) - ankle_height
     positions = places - np.array([middle[0], middle[1], ground])
     return Neutral(
-        skeleton=skeleton,
-        rotations=frozen_array(world),
-        positions=frozen_array(positions),
-        leg=leg,
-        ankle_height=ankle_height,
-        ball=frozen_array(ball),
-        heel=0.065 * leg,
+        skeleton=skeleton, rotations=frozen_array(world), positions=frozen_array(positions), leg=leg,
+        ankle_height=ankle_height, ball=frozen_array(ball), heel=0.065 * leg,
         tip=float(np.mean(tips)) if tips else 0.075 * leg,
     )
 

@@ -1,8 +1,7 @@
 """A body's movement in anatomical terms, and how any humanoid skeleton takes it on.
 
 A `Posture` says where the pelvis is and how it is turned, how the trunk bends, what the arms do, and where the feet
-are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through the neutral
-stance."""
+are. Nothing in it speaks of a particular skeleton's joints, rest pose or axes: `to_motion` does, through `neutral`."""
 
 from __future__ import annotations
 
@@ -102,8 +101,7 @@ def foot_rotation(feet: np.ndarray) -> np.ndarray:
 
 
 def _turns(posture: Posture, neutral: Neutral, body: Humanoid) -> np.ndarray:
-    """World turn of every joint relative to the neutral stance (T, J, 4); a joint nobody speaks of follows its
-    parent."""
+    """World turn of every joint relative to the neutral stance (T, J, 4); other joints follow their parents."""
     skeleton = neutral.skeleton
     said = _trunk(posture, body)
     chest = said[body.chest]
@@ -169,8 +167,7 @@ def _leg(posture: Posture, neutral: Neutral, joints: Limb, side: int) -> dict[in
 
 
 def knee_pole(posture: Posture, top: np.ndarray, side: int) -> np.ndarray:
-    """Where the knee points (T, 3): between pelvis and foot, carried along as the leg swings off the pelvis's own
-    down."""
+    """Where the knee points (T, 3): between pelvis and foot, carried along as the leg swings."""
     pelvis = pelvis_rotation(posture)
     sign = 1.0 if side == 0 else -1.0
     yaw = quaternion.wrapped(posture.feet[:, side, 2] - quaternion.yaw(pelvis))

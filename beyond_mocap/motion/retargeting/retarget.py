@@ -11,23 +11,31 @@ for the middle between the hip joints and for both ankles, which the target's le
 with the knees pointing where the source's point. Travel is scaled with the legs, so a foot that stands still goes on
 standing still; where places count (a pitch, a ball) travel is kept instead, x' = x, and the legs take longer or shorter
 steps than their own. Joints that a skeleton lacks go with the segment that carries them.
+
+Which joint is which: by a saved map, by names, and where these say nothing by structure. A map is a JSON object, source
+joint -> target joint, as users of other tools keep them:
+
+    {"Bip001 Pelvis": "Hips", "Bip001 L Thigh": "LeftUpLeg"}
+
+It need not be complete: a joint that it leaves out is found by its name or by its place in the body (`humanoid`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from ...base.errors import InputError
 from ...base.vectors import unit_vectors
 from .. import limb, quaternion
-from ..humanoid import Limb
+from ..humanoid import Humanoid, Limb, assemble, identify, identify_posed, roles_of
 from ..motion import Motion, forward_kinematics, local_rotations
 from ..skeleton import Skeleton
 from .anatomy import Anatomy, head_chain, spine_shares, study
-from .bone_map import Pairs, pair
 
 _SOFT = 0.01  # m below full length from where a limb eases
 _LIMB_PARTS = ("shoulder", "upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot", "toe")
@@ -36,37 +44,30 @@ _CARRIED_BY = {"upper_arm": "shoulder", "lower_arm": "upper_arm", "hand": "lower
 _SAME_RIG = np.cos(np.radians(12.0))
 _TRUNK_ROUNDS = 3  # of turning the trunk and seeing what is left
 _UP = np.array([0.0, 0.0, 1.0])
+_FORM = '{"source joint": "target joint", ...}'
 
 
 class Retargeter:
     """Carries recordings of one rig to another, at their own rate: both are studied once.
 
     Root positions are metres, world, Z up; heights are kept over the same floor. The skeleton itself given as target
-    gives the motion back.
-    """
+    gives the motion back."""
 
     def __init__(
-        self,
-        sample: Motion,
-        skeleton: Skeleton,
-        bone_map: dict[str, str] | str | Path | None = None,
-        *,
-        example: Motion | None = None,
-        standing: np.ndarray | None = None,
-        example_standing: np.ndarray | None = None,
+        self, sample: Motion, skeleton: Skeleton, bone_map: dict[str, str] | str | Path | None = None, *,
+        example: Motion | None = None, standing: np.ndarray | None = None, example_standing: np.ndarray | None = None,
         keeps_travel: bool = False,
     ):
         """sample: frames of the recordings (their order does not matter).
 
-        bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`bone_map.load`);
+        bone_map: source joint -> target joint, or the path of a JSON file that holds such an object (`load_bone_map`);
         pairs in it go before those found by names and structure. example: a recording on `skeleton`, which tells how
         its rig twists its bones and holds its trunk; without it the rest pose does. standing, example_standing (T, 2)
         bool: left and right foot on the ground in `sample` and in `example`, which tells how soles lie; without it low
         feet count as standing. keeps_travel: footprints and the way over the ground stay where they are, whatever the
-        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint.
-        """
+        legs' length. Raises InputError where either skeleton has no legs or the map names an unknown joint."""
         self.keeps_travel = keeps_travel
-        self.pairs = pair(sample, skeleton, bone_map, example)
+        self.pairs = pair_joints(sample, skeleton, bone_map, example)
         self.source = study(sample.skeleton, self.pairs.source, sample, standing)
         same = _same_rig(sample.skeleton, skeleton) if example is None else sample.skeleton.same_bones(skeleton)
         if same:  # its own recording says best how the rig is used: this very skeleton gets this very motion
@@ -271,3 +272,100 @@ def _laid(skeleton: Skeleton, world: np.ndarray) -> np.ndarray:
     for joint, parent in enumerate(parents, 1):
         places[:, joint] = places[:, parent] + bones[:, joint - 1]
     return places
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Two bodies and what they share.
+
+    source, target: which joint is what. others: target joint -> source joint for joints without a meaning (fingers,
+    twist bones). tops: the joints of source and target that end the trunk in the same place, None where there are none.
+    """
+
+    source: Humanoid
+    target: Humanoid
+    others: dict[int, int]
+    tops: tuple[int, int] | None
+
+
+def load_bone_map(path: str | Path) -> dict[str, str]:
+    """A saved map; InputError where the file cannot be read or is not a JSON object of names."""
+    try:
+        found = json.loads(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "a bone map (JSON)", "check the path") from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"not JSON ({error})", _FORM, "mend the file") from None
+    if not isinstance(found, dict) or not all(isinstance(name, str) for name in found.values()):
+        raise InputError(path, "not an object of names", _FORM, "mend the file")
+    return found
+
+
+def save_bone_map(path: str | Path, pairs: Pairs, source: Skeleton, target: Skeleton) -> None:
+    """Writes the joints that belong together as a map for `load_bone_map`; spines are shared by length, not in it."""
+    theirs = roles_of(pairs.target)
+    named = {joint: theirs[role] for role, joint in roles_of(pairs.source).items() if role in theirs}
+    named |= {mine: its for its, mine in pairs.others.items()}
+    table = {source.names[mine]: target.names[its] for mine, its in sorted(named.items())}
+    Path(path).write_text(json.dumps(table, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def pair_joints(
+    motion: Motion, skeleton: Skeleton, bone_map: Mapping[str, str] | str | Path | None = None,
+    example: Motion | None = None,
+) -> Pairs:
+    """The joints of `motion`'s skeleton and of `skeleton` that belong together.
+
+    bone_map: as `load_bone_map` returns it, or a path. example: a recording on `skeleton`, whose poses show left from
+    right where its names do not. Raises InputError for a map with unknown names and for skeletons without legs."""
+    where = str(bone_map) if isinstance(bone_map, (str, Path)) else "bone map"
+    table = load_bone_map(bone_map) if isinstance(bone_map, (str, Path)) else dict(bone_map or {})
+    links = {_index(motion.skeleton, mine, where): _index(skeleton, its, where) for mine, its in table.items()}
+    found = _roles(motion.skeleton, motion), _roles(skeleton, example)
+    if links:
+        found = _linked(*found, links)
+    source, target = (assemble(one.names, one.parents, roles) for one, roles in zip((motion.skeleton, skeleton), found))
+    others = _others(motion.skeleton, skeleton, source, target, links)
+    return Pairs(source, target, others, _tops(source, target))
+
+
+def _index(skeleton: Skeleton, name: str, where: str) -> int:
+    if name not in skeleton.names:
+        raise InputError(where, f"no joint {name!r}", f"one of {', '.join(skeleton.names)}", "mend the name")
+    return skeleton.names.index(name)
+
+
+def _roles(skeleton: Skeleton, recording: Motion | None) -> dict[str, int]:
+    """What names or structure tell; empty where they tell nothing."""
+    try:
+        return roles_of(identify(skeleton) if recording is None else identify_posed(recording))
+    except InputError:
+        return {}
+
+
+def _linked(source: dict[str, int], target: dict[str, int], links: dict[int, int]):
+    """Both bodies' roles with the map's pairs put through: a mapped joint takes its partner's role."""
+    back = {joint: role for role, joint in target.items()}
+    source, target = dict(source), dict(target)
+    for mine, its in links.items():
+        role = back.get(its) or next((role for role, joint in source.items() if joint == mine), None)
+        if role is not None:
+            source = {other: joint for other, joint in source.items() if joint != mine} | {role: mine}
+            target[role] = its
+    return source, target
+
+
+def _others(source: Skeleton, target: Skeleton, mine: Humanoid, its: Humanoid, links: dict[int, int]) -> dict[int, int]:
+    """Target joint -> source joint where neither has a meaning: mapped ones, and those of the same name."""
+    taken = [set(roles_of(body).values()) | set(body.spine) for body in (mine, its)]
+    same = {source.names.index(name): joint for joint, name in enumerate(target.names) if name in source.names}
+    return {b: a for a, b in {**same, **links}.items() if a not in taken[0] and b not in taken[1]}
+
+
+def _tops(source: Humanoid, target: Humanoid) -> tuple[int, int] | None:
+    """Where both trunks end: at the neck, else at the head."""
+    for part in ("neck", "head"):
+        joints = getattr(source, part), getattr(target, part)
+        if None not in joints:
+            return joints
+    return None

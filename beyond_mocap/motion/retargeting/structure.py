@@ -22,9 +22,7 @@ _TELLING = 1e-2
 def find(parents: Sequence[int], places: np.ndarray, tips: np.ndarray) -> dict[str, int] | None:
     """Roles ("left upper_leg", ...) -> joint from poses (T, J, 3) in metres; None where no pair of legs is found.
 
-    tips (T, J, 3): where each joint's bone ends, the joint itself where that is not known; shows how toeless feet
-    point.
-    """
+    tips (T, J, 3): where each joint's bone ends, the joint itself where unknown; shows how toeless feet point."""
     lengths = np.array([np.linalg.norm(places[0, j] - places[0, p]) if p >= 0 else 0.0 for j, p in enumerate(parents)])
     pairs = _limb_pairs(list(parents), lengths)
     if not pairs:
@@ -97,8 +95,7 @@ def _legs_and_arms(parents, pairs):
 
 
 def _sided(legs, places, tips, parents, arms):
-    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as they
-    stand."""
+    """The pair of legs as (left, right): by feet that point forward and knees that bend backward, else as is."""
     a, b = legs
     hips = 0.5 * (places[:, a[0]] + places[:, b[0]])
     ends = [arm[0] for arm in arms] if arms is not None else [0]
@@ -120,8 +117,7 @@ def _toe(parents, lengths, foot: int) -> int | None:
 
 
 def neck_and_head(parents, chest: int, taken: set[int], roles: Mapping[str, int]) -> dict[str, int]:
-    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has is
-    kept."""
+    """Roles "neck" and "head" for the longest chain that hangs on the chest and is no limb; what `roles` has stays."""
     if "neck" in roles:
         chain = _straight(parents, roles["neck"])
     else:
@@ -167,6 +163,12 @@ def path(parents, joint: int) -> list[int]:
         found.append(joint)
         joint = parents[joint]
     return found
+
+
+def list_between(parents, low: int, high: int) -> list[int]:
+    """Joints strictly between `low` and `high`, from below; empty where `high` does not hang on `low`."""
+    chain = path(parents, high)
+    return chain[1 : chain.index(low)][::-1] if low in chain else []
 
 
 def below(parents, joint: int) -> list[int]:

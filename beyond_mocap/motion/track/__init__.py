@@ -6,21 +6,10 @@
 """
 
 from .cleaning import FASTEST, DataReport, clean
-from .data import BALL_RADIUS, SampledTrack, Track
+from .data import BALL_RADIUS, SampledTrack, Track, at_sentinel
 from .sampling import SMOOTHING_SECONDS, sample, smoothed, travel_direction, zero_phase_hann
-from .sentinels import at_sentinel
 
 __all__ = [
-    "BALL_RADIUS",
-    "FASTEST",
-    "SMOOTHING_SECONDS",
-    "DataReport",
-    "SampledTrack",
-    "Track",
-    "at_sentinel",
-    "clean",
-    "sample",
-    "smoothed",
-    "travel_direction",
-    "zero_phase_hann",
+    "BALL_RADIUS", "FASTEST", "SMOOTHING_SECONDS", "DataReport", "SampledTrack", "Track", "at_sentinel", "clean",
+    "sample", "smoothed", "travel_direction", "zero_phase_hann",
 ]

@@ -13,9 +13,8 @@ import numpy as np
 
 from ...base.errors import InputError, TimedLine, told_time
 from ...base.time_series import runs
-from .data import Track
+from .data import Track, at_sentinel
 from .sampling import GAP_INTERVALS, LONG_GAP
-from .sentinels import at_sentinel
 
 FASTEST = 12.0
 """m/s; nobody runs faster, so a sample that wants it is wrong."""
@@ -36,8 +35,7 @@ _LONGEST_GAP = 3600.0
 class DataReport:
     """What `clean` found. lines: for people, one finding each, with times. rate: samples per second (median). dropped:
     rows without a time. merged: rows whose time repeated. filled, outliers: samples put in and replaced. gaps: (start,
-    end) seconds between measured samples. ball_unknown: samples without a ball. warnings: those lines that ask for
-    attention."""
+    end) seconds between measured samples. ball_unknown: samples without it. warnings: lines that ask for attention."""
 
     lines: tuple[str, ...]
     rate: float
@@ -58,8 +56,7 @@ def clean(track: Track) -> tuple[Track, DataReport]:
     intervals, are put in and marked `filled`. Both get a cubic between the believed neighbours that starts and ends
     with their velocities (beyond one second only as curved as the distance allows); before the first and after the last
     believed sample, the velocity fades (to a third in half a second). A track that is already clean comes back equal.
-    InputError where fewer than two samples have a position, or a gap is longer than an hour.
-    """
+    InputError where fewer than two samples have a position, or a gap is longer than an hour."""
     times, positions, ball, notes, dropped, merged = _in_order(track)
     ball, notes = _real_ball(ball, notes)
     times, positions, ball = _with_missing_rows(times, positions, ball, track.name)
@@ -132,8 +129,7 @@ def _with_missing_rows(times, positions, ball, name: str):
 
 
 def _outliers(times: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, tuple[float, ...]]:
-    """(N,) bool samples not to be believed, and the times of steps too large to be repaired; all positions are
-    numbers."""
+    """(N,) bool samples not to be believed, and times of steps too large to repair; all positions are numbers."""
     wrong = _spikes(times, positions)
     left = np.flatnonzero(~wrong)
     jumps, excess = _jumps(times[left], positions[left])
@@ -159,8 +155,7 @@ def _spikes(times: np.ndarray, positions: np.ndarray) -> np.ndarray:
 
     A spike of size d is d off its line and puts its neighbours d/2 off theirs; a step puts the two samples beside it
     off theirs equally, so neither stands out and steps are left to `_jumps`. The first and last sample have one
-    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second.
-    """
+    neighbour only: they count as off the line of the third and fourth, or their own strays would blame the second."""
     wrong = np.zeros(len(times), dtype=bool)
     if len(times) < 5:
         return wrong
@@ -214,9 +209,7 @@ def _return(times: np.ndarray, jumps: list[int], excess: np.ndarray, place: int)
 
 def _coasted(times: np.ndarray, positions: np.ndarray, jump: int, size: float) -> np.ndarray:
     """Indices of the samples up to `jump` that are not believed: as many as making up for `size` metres takes, and on
-    back while they lie on an exact line. The first sample of such a line is where the player was last seen, and is
-    kept.
-    """
+    back while they lie on an exact line. The first of such a line is where the player was last seen, and is kept."""
     before = times[jump] - times[: jump + 1]
     first = int(np.searchsorted(-before, -max(_COAST[0], min(size / _CATCH_UP, _COAST[1]))))
     for start in range(min(first, jump - 3), -1, -1):
@@ -244,8 +237,7 @@ def _bridge(times: np.ndarray, positions: np.ndarray, believed: np.ndarray) -> n
 
 
 def _end_state(times, positions, believed, index: int, direction: int):
-    """(time, position, velocity) of the believed sample `index`, velocity over the believed samples beside it; or
-    None."""
+    """(time, position, velocity) of the believed sample `index`, velocity over the believed ones beside it; or None."""
     if not 0 <= index < len(times):
         return None
     members = [index]
@@ -261,8 +253,7 @@ def _end_state(times, positions, believed, index: int, direction: int):
 
 
 def _cubic(at: np.ndarray, before, after) -> np.ndarray:
-    """(len(at), 2): Hermite cubic from one end state to the other; beyond the track's ends, a velocity that dies
-    away."""
+    """(len(at), 2): Hermite cubic from one end state to the other; beyond the ends, a velocity that dies away."""
     if before is None or after is None:
         time, place, velocity = before or after
         away = at - time
@@ -273,24 +264,16 @@ def _cubic(at: np.ndarray, before, after) -> np.ndarray:
         most = 3.0 * np.linalg.norm(p1 - p0) / length
         v0, v1 = (v * min(1.0, most / max(np.linalg.norm(v), 1e-9)) for v in (v0, v1))
     s = ((at - t0) / length)[:, None]
-    return (
-        p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s)
-    )
+    return (p0 * (1 + 2 * s) * (1 - s) ** 2 + p1 * s * s * (3 - 2 * s) + length * s * (1 - s) * (v0 * (1 - s) - v1 * s))
 
 
 def _report(track: Track, notes: list[str], snaps: tuple[float, ...], dropped: int, merged: int) -> DataReport:
     gaps = _gaps(track)
     warnings = _warnings(track, snaps, gaps)
     return DataReport(
-        lines=(*notes, *_replacements(track), *warnings),
-        rate=1.0 / track.interval,
-        dropped=dropped,
-        merged=merged,
-        filled=int(track.filled.sum()),
-        outliers=int(track.outlier.sum()),
-        gaps=gaps,
-        ball_unknown=int(np.count_nonzero(_no_ball(track))),
-        warnings=tuple(warnings),
+        lines=(*notes, *_replacements(track), *warnings), rate=1.0 / track.interval, dropped=dropped, merged=merged,
+        filled=int(track.filled.sum()), outliers=int(track.outlier.sum()), gaps=gaps,
+        ball_unknown=int(np.count_nonzero(_no_ball(track))), warnings=tuple(warnings),
     )
 
 

@@ -8,10 +8,13 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ...base.errors import InputError
+from ...base.time_series import runs
 from ..skeleton import frozen_array
 
 BALL_RADIUS = 0.11
 """Metres; where a feed gives no height, the ball's centre lies this high."""
+
+_PITCH = 200.0  # metres from the centre beyond which no ball is
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +25,7 @@ class Track:
     +x. ball: (N, 3) metres, the ball's centre, NaN where unknown (z alone may be unknown); None means no ball.
     ball_height_known: (N,) bool, False where the feed has no height; None means wherever z is a number. filled: (N,)
     bool, put in by `clean` because the feed had nothing. outlier: (N,) bool, replaced by `clean` because the feed was
-    wrong; None means none. name: who this is, for messages. Arrays are read-only copies.
-    """
+    wrong; None means none. name: who this is, for messages. Arrays are read-only copies."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -78,8 +80,7 @@ class SampledTrack:
     speed: (T,) m/s. direction: (T,) radians from +x, of travel, unwrapped; holds while the player stands. valid: (T,)
     bool, False within a long gap, where nobody knows what the player did (and which is not standing). ball: (T, 3)
     metres, NaN where there is no ball at all. ball_measured: (T,) bool, False where it lies between samples too far
-    apart. fps: frames per second.
-    """
+    apart. fps: frames per second."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -105,3 +106,21 @@ class SampledTrack:
         """Frames start .. stop-1."""
         arrays = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "fps"}
         return SampledTrack(**{name: values[start:stop] for name, values in arrays.items()}, fps=self.fps)
+
+
+def at_sentinel(ball: np.ndarray) -> np.ndarray:
+    """(N,) bool: the samples of ball (N, 3) m that are known and no place of a ball: z below the ground, far outside,
+    or parked at the origin."""
+    seen = np.isfinite(ball[:, :2]).all(axis=1)
+    with np.errstate(invalid="ignore"):
+        return seen & ((np.abs(ball) > _PITCH).any(axis=1) | (ball[:, 2] < -1.0) | _parked_at_origin(ball))
+
+
+def _parked_at_origin(ball: np.ndarray) -> np.ndarray:
+    """(N,) bool: in a run of three or more samples exactly at (0, 0) that the ball did not roll into or out of."""
+    zero = (ball[:, :2] == 0.0).all(axis=1)
+    out = np.zeros(len(ball), dtype=bool)
+    for start, stop in runs(zero):
+        beside = [i for i in (start - 1, stop) if 0 <= i < len(ball) and np.isfinite(ball[i, :2]).all()]
+        out[start:stop] = stop - start >= 3 and all(np.linalg.norm(ball[i, :2]) > 1.5 for i in beside)
+    return out

@@ -1,5 +1,4 @@
-"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along at a steady rate of
-samples.
+"""Tracks that nobody has measured: a line on the ground with speeds at its points, run along in even samples.
 
 Between two points the speed changes evenly with time, as under a steady pull: its square changes evenly along the way,
 which lets a player start from a stand and come to one. A point with speed 0 is a stop.
@@ -35,8 +34,7 @@ def along(
     rising, the first 0 and the last the line's length. speeds: (P,) m/s at the points. waits: (P,) seconds that are
     spent where the speed is 0. start: seconds of the first sample. name: for messages. Samples lie 1 / HZ s apart,
     nearly: the first and the last are the line's ends. InputError for a line that is too short, two stops in a row,
-    speeds that are none or beyond FASTEST.
-    """
+    speeds that are none or beyond FASTEST."""
     line, arc, speeds, waits = (np.asarray(values, dtype=float) for values in (line, arc, speeds, waits))
     _check(line, arc, speeds, name)
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)

@@ -59,8 +59,7 @@ class Match:
     (start, end) seconds. notes: what was guessed, for people. teams: home, away, and referees where there are any.
     report: the data report, a line each: what was guessed, what was put right, who is there for how long. passed: for
     each period its number and the seconds that had passed at its first frame, () where they are 1, 2, ... from their
-    begin. Arrays are read-only.
-    """
+    begin. Arrays are read-only."""
 
     times: np.ndarray
     players: tuple[MatchPlayer, ...]
@@ -87,8 +86,7 @@ class Match:
     def track(self, player_id: str, start: float | None = None, end: float | None = None) -> Track:
         """One player and the ball between two times (seconds, whole match by default), from when he is first there.
 
-        InputError for an unknown player, or one with fewer than two samples in that time.
-        """
+        InputError for an unknown player, or one with fewer than two samples in that time."""
         path = self.positions[self._index(player_id)]
         low = -np.inf if start is None else start - 1e-9
         high = np.inf if end is None else end + 1e-9
@@ -103,8 +101,7 @@ class Match:
         """(start, end) seconds of the stretches in which a player is there, in order, all of more than one sample.
 
         Gaps of up to `gap` seconds do not end a stretch (`motion.track.clean` fills them), the end of a period does.
-        InputError for an unknown player.
-        """
+        InputError for an unknown player."""
         there = np.isfinite(self.positions[self._index(player_id)]).all(axis=1)
         found = []
         for begins, ends in self.periods:

@@ -30,26 +30,20 @@ def sample(track: Track, fps: float, window: float = SMOOTHING_SECONDS) -> Sampl
 
     window: seconds of `smoothed`.
     The ball is interpolated linearly, held before its first and after its last sample, and lies no lower than its
-    radius, which is also its height where the feed has none. InputError where there are fewer than two measured
-    samples.
-    """
+    radius, which is also its height where the feed has none. InputError below two measured samples."""
     times, fine, step = _grids(track, fps)
     positions = smoothed(interpolate(fine, track.times, track.positions), fps * step, window)[::step]
     measured = track.measured
-    velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2) if len(times) > 2 else _chord(positions, fps)
+    velocity = np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)  # of one or two frames
+    if len(times) > 2:
+        velocity = np.gradient(positions, 1.0 / fps, axis=0, edge_order=2)
     speed = np.linalg.norm(velocity, axis=1)
     ball, ball_measured = _ball(track, times)
     return SampledTrack(
-        times=times,
-        positions=positions,
-        raw=interpolate(times, track.times[measured], track.positions[measured]),
-        velocity=velocity,
-        speed=speed,
-        direction=travel_direction(velocity, fps),
-        valid=_bridged(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)),
-        ball=ball,
-        ball_measured=ball_measured,
-        fps=float(fps),
+        times=times, positions=positions, raw=interpolate(times, track.times[measured], track.positions[measured]),
+        velocity=velocity, speed=speed, direction=travel_direction(velocity, fps),
+        valid=_bridged(times, track.times[measured], max(GAP_INTERVALS * track.interval, LONG_GAP)), ball=ball,
+        ball_measured=ball_measured, fps=float(fps),
     )
 
 
@@ -61,8 +55,7 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
     the sixth. Measured on five real tracks of 20-25 Hz, difference of the 1.5 s Hann windows of result and samples,
     mean / 95 %: Hann 0.7 s alone 1.6 / 3.9 cm; 0.7 s corrected once 0.08 / 0.22 cm, but rms jerk 16 m/s^3; this one
     0.18 / 0.5 cm and jerk 10 m/s^3; a smoothing spline of the same jerk 0.2 / 0.5 cm, but 2-3 cm at the ends. The
-    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise.
-    """
+    window also has an end: an edit changes nothing beyond 1.8 s, bit for bit, which a spline cannot promise."""
     out = zero_phase_hann(positions, fps, window)
     for _ in range(2):
         out = out + zero_phase_hann(positions - out, fps, window)
@@ -72,8 +65,7 @@ def smoothed(positions: np.ndarray, fps: float, window: float = SMOOTHING_SECOND
 def zero_phase_hann(values: np.ndarray, fps: float, seconds: float) -> np.ndarray:
     """`values` (T, k) at `fps` under a symmetric Hann window `seconds` long; the ends are point-reflected.
 
-    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope.
-    """
+    Point reflection continues x beyond its last value e as 2 e - x backwards, so ends stay and keep their slope."""
     values = np.asarray(values, dtype=float)
     half = max(int(np.ceil(seconds * fps / 2.0 - 1e-9)) - 1, 0)
     if half == 0 or len(values) < 2:
@@ -88,8 +80,7 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
 
     Slower frames keep the direction they came with, and turn to the next one in the last half second before it: a
     player who stands does not spin with the noise, and does not snap round when setting off. All slow: the direction of
-    the frame that is fastest, 0 if none moves.
-    """
+    the frame that is fastest, 0 if none moves."""
     speed = np.linalg.norm(velocity, axis=1)
     moving = np.flatnonzero(speed >= min(MOVING_SPEED, speed.max(initial=0.0)))
     if not len(moving) or not speed.any():
@@ -98,18 +89,13 @@ def travel_direction(velocity: np.ndarray, fps: float) -> np.ndarray:
     frames = np.arange(len(velocity))
     before = np.clip(np.searchsorted(moving, frames, side="right") - 1, 0, None)
     after = np.clip(np.searchsorted(moving, frames), None, len(moving) - 1)
-    left = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, _pause(moving, before, after)), 0.0, 1.0)
+    pause = np.maximum(moving[after] - moving[before], 1)
+    left = np.clip((moving[after] - frames) / np.minimum(_TURN_SECONDS * fps, pause), 0.0, 1.0)
     return angles[after] + (angles[before] - angles[after]) * left * left * (3.0 - 2.0 * left)
 
 
-def _pause(moving: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Frames from the moving frame before to the one after, at least 1."""
-    return np.maximum(moving[after] - moving[before], 1)
-
-
 def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
-    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many values), and its steps per
-    frame."""
+    """Frame times, the times of a finer grid of at least 50 Hz (the window wants many), and its steps per frame."""
     if not 1.0 <= fps <= 480.0:
         raise InputError("fps", f"{fps}", "1 to 480 frames per second")
     if np.count_nonzero(track.measured) < 2 or not np.all(np.diff(track.times) > 0):
@@ -121,11 +107,6 @@ def _grids(track: Track, fps: float) -> tuple[np.ndarray, np.ndarray, int]:
     count = int(np.floor(duration * fps + 1e-6)) + 1
     fine = track.times[0] + np.arange((count - 1) * step + 1) / (fps * step)
     return fine[::step], fine, step
-
-
-def _chord(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Velocity (T, 2) m/s of one or two frames."""
-    return np.broadcast_to((positions[-1] - positions[0]) * fps, positions.shape)
 
 
 def _bridged(at: np.ndarray, times: np.ndarray, longest: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...annotation.gaze import wanted_offset
+from ...annotation.gaits import wanted_offset
 from ...library.library import Library
 from ...motion import quaternion
 from ...motion.foot_plant import Planted, plant

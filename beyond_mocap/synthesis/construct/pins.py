@@ -2,7 +2,7 @@
 
 A limb comes to its pin and leaves it within FADE seconds: there it is off its own way by what it is off at the pin,
 fading away. At a pin that holds it comes to rest, at a momentary one it passes. It gets there by two-bone inverse
-kinematics (`reach`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes
+kinematics (`limb`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes
 nearer, the feet held where they are; what still lacks is told. The gaze turns the head, with it the neck and a little
 the chest, as far as a neck can. Frames without a pin keep their bits.
 """
@@ -19,8 +19,8 @@ from ...base.time_series import runs
 from ...base.vectors import arctan2, unit_vector
 from ...motion import quaternion
 from ...motion.humanoid import Humanoid, heading_from_positions, identify
+from ...motion.limb import two_bone
 from ...motion.motion import Motion, pose_kinematics
-from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from .ball.carry import arm, leg
 

@@ -21,8 +21,8 @@ from ...base.time_series import runs
 from ...base.vectors import arctan2
 from ...motion import quaternion
 from ...motion.humanoid import Limb, identify
+from ...motion.limb import two_bone
 from ...motion.motion import pose_kinematics
-from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
 

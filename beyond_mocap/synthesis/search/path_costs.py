@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...annotation.gaze import wanted_offset
+from ...annotation.gaits import wanted_offset
 from ...library.library import Library
 from ..plan import Plan
 from .offer import RATES, SLOT, Offer, Pairs

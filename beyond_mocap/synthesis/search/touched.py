@@ -14,7 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...annotation.gaze import wanted_offset
+from ...annotation.gaits import wanted_offset
 from ...base.time_series import runs
 from ...library.library import Library
 from ...motion import quaternion

@@ -8,10 +8,9 @@ import numpy as np
 
 from ...base.errors import InputError
 from ...motion import quaternion
-from ...motion.between_frames import cubic_at
 from ...motion.humanoid import identify, stature
 from ...motion.mirror import mirror
-from ...motion.motion import Motion, forward_kinematics, place
+from ...motion.motion import Motion, cubic_at, forward_kinematics, place
 from ...motion.skeleton import frozen_array
 from .chains import EFFECTORS, chains_of
 from .description import AHEAD, BACK, STEP, Description

@@ -17,8 +17,7 @@ import numpy as np
 from ...base.errors import InputError
 from ...base.vectors import arctan2
 from ...motion import quaternion
-from ...motion.between_frames import cubic_at
-from ...motion.motion import pose_kinematics
+from ...motion.motion import cubic_at, pose_kinematics
 from .chains import chains_of
 from .description import Description
 from .example import Example

@@ -54,7 +54,7 @@ def test_words_are_learned_and_proposed_for_a_new_clip(core, rooms, library):
     listed = bpy.context.object.beyond_mocap_proposals
     kick = listed.listed[place_of(listed, "kick")]
     assert kick.source == "learned" and abs(kick.key - 156) <= 2 and kick.confidence > 0.5
-    read = core("library.classify.keep").read(kept)
+    read = core("library.classify.classifier").read_classifier(kept)
     recording = core("files.bvh.bvh").read(library / "new.bvh").motion
     same = [one.annotation for one in core("library.proposals").propose(recording, classifier=read)
             if one.confidence >= 0.5]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.annotation.gaze import direction_words, wanted_offset
+from beyond_mocap.annotation.gaits import direction_words, wanted_offset
 from beyond_mocap.motion.track import Track, sample
 
 

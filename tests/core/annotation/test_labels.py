@@ -24,7 +24,7 @@ SYNTHETIC = {  # builders of motions and matches, each of certain labels
 ALLOWED = {
     "beyond_mocap/passes/strike_choice.py": "a volley by hand is a volleyball player's, which no single label says",
     "beyond_mocap/library/landings.py": "is about getting up",
-    "beyond_mocap/files/events/event_tables.py": "providers' kinds of events",
+    "beyond_mocap/files/event_providers.py": "providers' kinds of events",
     "beyond_mocap/match/pieces/pool.py": "a cluster that is running",
     "beyond_mocap/library/one_skeleton.py": "arguments by name",
 }

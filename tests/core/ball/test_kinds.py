@@ -9,7 +9,7 @@ from beyond_mocap.ball.tracked.ends import ball_ends
 from beyond_mocap.ball.tracked.kinds import keeper_kind, keepers, kind_of, leaves_line, part_of
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve
 from beyond_mocap.ball.tracked.who import choose
-from beyond_mocap.files.touches_csv import COLUMNS, write_touches
+from beyond_mocap.files.tables import TOUCH_COLUMNS, write_touches
 
 
 @pytest.mark.parametrize("height, part", [(0.11, "foot"), (0.8, "foot"), (1.2, "chest"), (1.9, "head"), (None, "foot")])
@@ -90,5 +90,5 @@ def test_touches_as_a_table(tmp_path):
     write_touches(tmp_path / "t.csv", [touch])
     with open(tmp_path / "t.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    assert tuple(rows[0]) == COLUMNS
+    assert tuple(rows[0]) == TOUCH_COLUMNS
     assert float(rows[0]["time_s"]) == 1.25 and rows[0]["player"] == "home_7" and float(rows[0]["after_x_m_s"]) == 9.0

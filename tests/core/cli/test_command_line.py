@@ -13,7 +13,7 @@ import pytest
 
 from beyond_mocap.annotation import read_timeline
 from beyond_mocap.cli.main import _interrupts, main
-from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.cli.outputs import Told
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.library.made import KICKED, MADE_FOLDER

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh, bvh_text
-from beyond_mocap.files.bvh.bvh_form import BvhForm
+from beyond_mocap.files.bvh.bvh_write import BvhForm
 from beyond_mocap.motion.humanoid import heading
 from beyond_mocap.motion.motion import end_positions, forward_kinematics
 from beyond_mocap.synthetic.gait import gait

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from beyond_mocap.annotation.event_words import KINDS
 from beyond_mocap.annotation.striking import BODY_PARTS
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.files.events.event_players import Who, same_players
-from beyond_mocap.files.events.event_providers import guessed_event_provider, other_file
-from beyond_mocap.files.events.events import read_events
+from beyond_mocap.files.event_data import Who, same_players
+from beyond_mocap.files.event_providers import guessed_event_provider, other_file
+from beyond_mocap.files.events import read_events
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer
 
 PLAYERS = (

@@ -3,8 +3,8 @@
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.library.add_clip import add_clip
 from beyond_mocap.library.build import build
+from beyond_mocap.library.keep_words import add_clip
 from beyond_mocap.synthetic.gait import gait
 
 

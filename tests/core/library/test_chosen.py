@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.base.settings.synthesis import gait_choices
-from beyond_mocap.library.chosen import with_chosen_gaits
+from beyond_mocap.library.automatic import with_chosen_gaits
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.synthesize import synthesize
 

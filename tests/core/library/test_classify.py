@@ -10,11 +10,10 @@ import pytest
 from beyond_mocap.annotation import ClipAnnotation, read_annotation_csv
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.files.bvh import bvh
-from beyond_mocap.library.classify import confidence, keep, train
+from beyond_mocap.library.classify import classifier, kernel, train
 from beyond_mocap.library.classify.examples import Example, act_of
-from beyond_mocap.library.classify.signals import signals
+from beyond_mocap.library.classify.signals import LENGTH, signals, windows
 from beyond_mocap.library.classify.train import trained
-from beyond_mocap.library.classify.windows import LENGTH, windows
 from beyond_mocap.library.proposals import propose
 from beyond_mocap.motion.mirror import mirror
 from beyond_mocap.motion.motion import place, resample
@@ -102,10 +101,10 @@ def test_what_it_does_not_know_is_left_to_the_rules(known):
 def test_the_same_examples_give_the_same_bits_and_a_file_keeps_them(examples, known, tmp_path):
     again = trained(examples[:])
     for name, one in (("a.npz", known), ("b.npz", again)):
-        keep.write(tmp_path / name, one)
+        classifier.write_classifier(tmp_path / name, one)
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
     motion = volley("head", adult_skeleton(1.7), seed=5).motion
-    read = keep.read(tmp_path / "a.npz")
+    read = classifier.read_classifier(tmp_path / "a.npz")
     assert propose(motion, classifier=read) == propose(motion, classifier=known)
     assert read.told() == known.told() and read.told()[0] == "learned from 10 clips"
 
@@ -113,17 +112,17 @@ def test_the_same_examples_give_the_same_bits_and_a_file_keeps_them(examples, kn
 def test_files_that_are_none_are_refused_in_one_line(known, tmp_path):
     good, bad = tmp_path / "good.npz", tmp_path / "bad.npz"
     with pytest.raises(InputError, match="no such file"):
-        keep.read(bad)
-    keep.write(good, known)
+        classifier.read_classifier(bad)
+    classifier.write_classifier(good, known)
     data = good.read_bytes()
     for content in (b"", b"no archive", data[: len(data) // 2]):
         bad.write_bytes(content)
         with pytest.raises(InputError, match="learn from annotated clips again"):
-            keep.read(bad)
+            classifier.read_classifier(bad)
     for wrong in (replace(known.space, scale=np.zeros(LENGTH)), replace(known.space, mean=np.full(LENGTH, np.nan))):
-        keep.write(bad, replace(known, space=wrong))
+        classifier.write_classifier(bad, replace(known, space=wrong))
         with pytest.raises(InputError, match="do not belong together"):
-            keep.read(bad)
+            classifier.read_classifier(bad)
 
 
 @pytest.mark.parametrize("change", [
@@ -133,7 +132,7 @@ def test_files_that_are_none_are_refused_in_one_line(known, tmp_path):
 ])
 def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
     path = tmp_path / "words.npz"
-    keep.write(path, known)
+    classifier.write_classifier(path, known)
     with np.load(path) as stored:
         arrays = {name: stored[name] for name in stored.files}
     header = json.loads(arrays["header"].tobytes())
@@ -141,7 +140,7 @@ def test_numbers_that_no_training_gives_are_refused(known, tmp_path, change):
     header["acts"][0].update({name: value for name, value in change.items() if not callable(value)})
     np.savez(path, **{**arrays, "header": np.frombuffer(json.dumps(header).encode(), np.uint8)})
     with pytest.raises(InputError, match="do not belong together"):
-        keep.read(path)
+        classifier.read_classifier(path)
 
 
 def test_a_large_library_is_learned_from_a_part_of_its_windows(examples, monkeypatch):
@@ -193,10 +192,10 @@ def test_an_act_is_what_is_done_not_how_one_goes():
 
 def test_confidence_follows_examples_as_far_as_there_are_some():
     score, silent = np.linspace(-1.0, 1.0, 401), np.full(401, -1.0)
-    few = confidence.calibrated(np.array([0.9, -0.9]), np.array([-1.0, -1.0]), np.array([True, False]), False)
-    assert np.allclose(few, confidence.PRIOR[False], atol=0.5)
-    many = confidence.calibrated(score, silent, score > 0.4, False)
-    assert confidence.sure(many, 0.25, -1.0) < confidence.sure(few, 0.25, -1.0)
+    few = kernel.fit_confidence(np.array([0.9, -0.9]), np.array([-1.0, -1.0]), np.array([True, False]), False)
+    assert np.allclose(few, kernel.PRIOR[False], atol=0.5)
+    many = kernel.fit_confidence(score, silent, score > 0.4, False)
+    assert kernel.compute_confidence(many, 0.25, -1.0) < kernel.compute_confidence(few, 0.25, -1.0)
 
 
 @pytest.mark.skipif(not (REAL / "annotations.csv").is_file(), reason="no recordings to measure on beside the clone")

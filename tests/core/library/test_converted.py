@@ -8,9 +8,8 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.library.build import build
 from beyond_mocap.library.cache import place
-from beyond_mocap.library.converted import Conversions, stamp_of
 from beyond_mocap.library.listing import scanned
-from beyond_mocap.library.scan import own_recordings
+from beyond_mocap.library.scan import Conversions, own_recordings, stamp_of
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from beyond_mocap.library.clip import Clip
 from beyond_mocap.library.features import (
     HORIZON,
-    describe,
+    describe_clips,
     feature_joints,
     principal_components,
     raw_features,
@@ -51,7 +51,7 @@ def test_distance_is_the_mean_over_joints_of_places_an_instant_later():
 
 def test_path_heading_and_speed_follow_the_recording():
     moved = place(WALK, 1.1, (3.0, -2.0, 0.0))
-    a, b = (describe(m.skeleton, [clip(m)], lambda c, s: np.zeros((len(s), 0), bool), (), 30.0) for m in (WALK, moved))
+    a, b = (describe_clips([clip(m)]) for m in (WALK, moved))
     assert np.allclose(a.velocity, b.velocity, atol=1e-9) and np.allclose(b.heading - a.heading, 1.1, atol=1e-9)
     cosine, sine = np.cos(1.1), np.sin(1.1)
     turned = a.path @ np.array([[cosine, sine], [-sine, cosine]]) + [3.0, -2.0]

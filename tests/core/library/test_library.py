@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.library.build import build
-from beyond_mocap.library.describe_clips import words_matrix
+from beyond_mocap.library.features import words_matrix
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.skeleton import Skeleton

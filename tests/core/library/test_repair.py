@@ -150,14 +150,14 @@ def test_the_shortest_clips_pass(walk, count):
 def test_what_was_done_is_told_once_per_kind(walk):
     done = repair.grounded(walk)
     mended = replace(done, drift=0.04, slid=True, slide=(0.3, 0.05), travel=0.2)
-    lines = repair.told([(done, 0), (mended, 3), (mended, 0)])
+    lines = repair.describe_repairs([(done, 0), (mended, 3), (mended, 0)])
     assert lines == [
         "3 single-frame jumps of joints taken out of 1 clips",
         "floor levelled in 2 clips, by 4 cm in the median",
         "standing feet held in 2 clips: they slid 30 cm/s and now 5 cm/s in the mean; "
         "the way corrected by 0.20 m in the median",
     ]
-    assert repair.told([(done, 0)]) == []
+    assert repair.describe_repairs([(done, 0)]) == []
 
 
 def flat_slide(motion: Motion, standing: np.ndarray) -> float:

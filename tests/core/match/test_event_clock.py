@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.files.events.event_data import MatchEvent, MatchEvents
+from beyond_mocap.files.event_data import MatchEvent, MatchEvents
 from beyond_mocap.match.event_clock import aligned
 from beyond_mocap.motion.track.match_data import Half
 

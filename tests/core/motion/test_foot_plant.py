@@ -8,8 +8,8 @@ import pytest
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.foot_plant import MOST_DROP, plant, shift
 from beyond_mocap.motion.humanoid import identify, leg_length
+from beyond_mocap.motion.limb import two_bone
 from beyond_mocap.motion.motion import local_rotations, place, pose_kinematics
-from beyond_mocap.motion.reach import two_bone
 from beyond_mocap.motion.retargeting.neutral import neutral_stance
 from beyond_mocap.synthetic.gait import gait
 

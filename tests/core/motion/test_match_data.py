@@ -10,8 +10,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.tracking.feed import Feed
 from beyond_mocap.files.tracking.match_repairs import mended_ball, mended_players, mended_sides, side_lines
 from beyond_mocap.files.tracking.providers import PROVIDERS
-from beyond_mocap.files.tracking.referees import referee_samples
-from beyond_mocap.files.tracking.team_colours import team_colours
+from beyond_mocap.files.tracking.referees import read_team_colours, referee_samples
 from beyond_mocap.files.tracking.tracking import read_match
 from beyond_mocap.motion.track.match_data import Match, MatchPlayer, presence_lines
 
@@ -235,7 +234,7 @@ def test_a_team_s_file_that_ends_before_the_other_s_is_told(tmp_path):
 ])
 def test_colours_of_shirts_are_found(tmp_path, said, expected):
     (tmp_path / "m").write_text(said)
-    found = team_colours(Feed(PROVIDERS["pff"], (tmp_path / "m",), (tmp_path / "m",)))
+    found = read_team_colours(Feed(PROVIDERS["pff"], (tmp_path / "m",), (tmp_path / "m",)))
     assert (found["home"], found["away"]) == expected
 
 

@@ -6,8 +6,8 @@ import pytest
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.limb import CLEAR_BEND, bent_limb, two_bone
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.motion.reach import CLEAR_BEND, bent_limb, two_bone
 from beyond_mocap.synthetic.gait import gait
 
 

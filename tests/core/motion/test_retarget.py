@@ -14,8 +14,7 @@ from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import heading, identify, leg_length
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
-from beyond_mocap.motion.retargeting.bone_map import load, pair, save
-from beyond_mocap.motion.retargeting.retarget import Retargeter
+from beyond_mocap.motion.retargeting.retarget import Retargeter, load_bone_map, pair_joints, save_bone_map
 from beyond_mocap.motion.skeleton import Skeleton
 from beyond_mocap.synthetic.gait import gait
 
@@ -183,8 +182,8 @@ def test_a_saved_map_goes_before_names(run, tmp_path):
     table = dict(zip(blind.skeleton.names, run.skeleton.names))
     (tmp_path / "map.json").write_text(json.dumps(table))
     assert apart(retarget(blind, run.skeleton, tmp_path / "map.json", example=run), run) < 1e-6
-    save(tmp_path / "saved.json", pair(blind, run.skeleton), blind.skeleton, run.skeleton)
-    saved = load(tmp_path / "saved.json")
+    save_bone_map(tmp_path / "saved.json", pair_joints(blind, run.skeleton), blind.skeleton, run.skeleton)
+    saved = load_bone_map(tmp_path / "saved.json")
     assert saved["J0"] == "Hips" and set(saved.items()) <= set(table.items())
     assert apart(retarget(blind, run.skeleton, {"J0": "Hips"}, example=run), run) < 1e-6
 

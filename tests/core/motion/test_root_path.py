@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion.path.root_path import SLACK, ground_path
+from beyond_mocap.motion.path.smooth_spline import SLACK, ground_path
 
 FPS = 30.0
 TIME = np.arange(150) / FPS

@@ -11,7 +11,7 @@ from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.base.errors import Cancelled, NotInLibrary
 from beyond_mocap.cli.main import main
-from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.cli.outputs import Told
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.files.tables import read_ball
 from beyond_mocap.motion.humanoid import stature

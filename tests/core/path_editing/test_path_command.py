@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.cli.main import main
-from beyond_mocap.cli.progress_reporter import Told
+from beyond_mocap.cli.outputs import Told
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.synthesis.provenance import read_provenance
 from beyond_mocap.synthetic.gait import gait

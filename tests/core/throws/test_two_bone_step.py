@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.motion import quaternion, reach
+from beyond_mocap.motion import limb, quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.synthetic.throws import throw
@@ -37,7 +37,7 @@ def test_the_end_joint_gets_there_as_the_solver_of_whole_motions_brings_it(joint
     upper, lower, there = bend_to(top, middle, end, target, hinges(places, joints), np)
     _, now = moved(places, upper, lower, joints)
     assert np.allclose(now, there, atol=1e-8)
-    other = reach.two_bone(MOTION.skeleton, MOTION.root_positions, MOTION.rotations, joints, target)
+    other = limb.two_bone(MOTION.skeleton, MOTION.root_positions, MOTION.rotations, joints, target)
     miss = np.linalg.norm(now - target, axis=-1)
     assert np.allclose(miss, other.miss, atol=1e-7)
     whole = forward_kinematics(type(MOTION)(MOTION.skeleton, MOTION.root_positions, other.rotations, 60.0))[0]

@@ -17,9 +17,8 @@ import numpy as np
 from ....annotation.striking import Surface
 from ....motion import quaternion
 from ....motion.humanoid import Limb, identify
-from ....motion.limb import inner_angle
+from ....motion.limb import inner_angle, two_bone
 from ....motion.motion import pose_kinematics
-from ....motion.reach import two_bone
 from ....motion.skeleton import Skeleton
 
 MOST_BEND = {"head": 0.6, "chest": 0.35}
@@ -70,7 +69,7 @@ def arm(limb: Limb) -> tuple[int, int, int]:
 @dataclass(frozen=True, eq=False)
 class Resting:
     """A limb that reaches for where its end is anyway, which a nearly straight limb misses a little: `chain` and `soft`
-    as for `reach.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
+    as for `limb.two_bone`; world: (W, 4) rotations of the limb's joints, by joint."""
 
     chain: tuple[int, int, int]
     soft: float

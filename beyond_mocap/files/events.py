@@ -1,4 +1,5 @@
-"""Events of a match in: providers' files through kloppy, and plain tables, with the tracking's players."""
+"""Events of a match in: providers' files through kloppy, whose kinds, qualifiers and results become our words, and
+plain tables, with the tracking's players."""
 
 from __future__ import annotations
 
@@ -7,21 +8,40 @@ from pathlib import Path
 
 import numpy as np
 
-from ...base.errors import InputError
-from ...motion.track.match_data import Match
-from ..tracking.match_repairs import home_end
-from .event_data import MatchEvent, MatchEvents
-from .event_kinds import kind_of
-from .event_players import Who, same_players
-from .event_providers import EVENT_PROVIDERS, EventProvider, guessed_event_provider, load_events, other_file
-from .event_tables import pitch_size
+from ..base.errors import InputError
+from ..motion.track.match_data import Match
+from .event_data import MatchEvent, MatchEvents, Who, same_players
+from .event_providers import EVENT_PROVIDERS, EventProvider, guessed_event_provider, load_events, other_file, pitch_size
+from .tracking.match_repairs import home_end
 
 _LEAST_KNOWN = 0.5  # share of the events' players who must be in the tracking
+_KINDS = {
+    "PASS": "pass", "SHOT": "shot", "TAKE_ON": "take-on", "CARRY": "carry", "CLEARANCE": "clearance",
+    "INTERCEPTION": "interception", "RECOVERY": "touch", "MISCONTROL": "miscontrol", "BALL_OUT": "out",
+    "FOUL_COMMITTED": "foul", "DUEL": "tackle", "GOALKEEPER": "save",
+}  # fmt: skip
+_BY_NAME = {  # of events that kloppy leaves generic
+    "ball receipt*": "receive", "reception": "receive", "receival": "receive", "touch": "touch", "ball touch": "touch",
+    "block": "deflection",
+}  # fmt: skip
+_BY_KEEPER = {"CLAIM": "catch", "PUNCH": "punch", "PICK_UP": "pick-up", "SMOTHER": "catch"}
+_PARTS = {
+    "RIGHT_FOOT": ("foot", "right"), "LEFT_FOOT": ("foot", "left"), "HEAD": ("head", ""), "CHEST": ("chest", ""),
+    "BOTH_HANDS": ("hand", ""), "LEFT_HAND": ("hand", "left"), "RIGHT_HAND": ("hand", "right"),
+    "KEEPER_ARM": ("hand", ""), "DROP_KICK": ("foot", ""),
+}  # fmt: skip
+_PASSES = {"HEAD_PASS": ("head", ""), "HAND_PASS": ("hand", "")}
+_DETAILS = {
+    "THROW_IN": "throw-in", "CORNER_KICK": "corner", "FREE_KICK": "free-kick", "GOAL_KICK": "goal-kick",
+    "KICK_OFF": "kick-off", "PENALTY": "penalty", "SLIDING_TACKLE": "sliding", "CROSS": "cross",
+    "HIGH_PASS": "high", "LONG_BALL": "long", "LAUNCH": "long", "CHIPPED_PASS": "chipped",
+}  # fmt: skip
+_GOOD = {"COMPLETE", "GOAL", "WON", "SUCCESS"}
+_BAD = {"INCOMPLETE", "OUT", "OFFSIDE", "OFF_TARGET", "POST", "BLOCKED", "SAVED", "LOST"}
+
 
 def read_events(
-    path: str | os.PathLike,
-    meta: str | os.PathLike | None = None,
-    provider: str | None = None,
+    path: str | os.PathLike, meta: str | os.PathLike | None = None, provider: str | None = None,
     match: Match | None = None,
 ) -> MatchEvents:
     """A provider's events, with the players of a tracked match.
@@ -30,8 +50,7 @@ def read_events(
     of Metrica and Sportec, Stats Perform's MA1); where None, one beside `path` whose name fits. provider: one of
     `event_providers.EVENT_PROVIDERS`; where None, guessed from the content. match: whose ids the players get and on
     whose pitch the places are; without one they keep their own. InputError where files are missing or not of that form,
-    and where most players are not in the match: the events are of another one.
-    """
+    and where most players are not in the match: the events are of another one."""
     if not Path(path).is_file():
         found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a file of events", "check the path")
@@ -81,7 +100,7 @@ def _through_kloppy(path: Path, provider: EventProvider, second: Path | None, ma
     place = _placing(dataset, match)
     rows = []
     for record in dataset.records:
-        kind, part, side, details, success = kind_of(record, provider.tells_foot)
+        kind, part, side, details, success = translate_kind(record, provider.tells_foot)
         team = str(record.team.ground) if record.team else ""
         event = MatchEvent(time=record.timestamp.total_seconds(), period=int(record.period.id), player="", team=team,
                            kind=kind, part=part, side=side, details=details, said=str(record.event_name),
@@ -131,3 +150,32 @@ def _ends(match: Match | None) -> dict[int, float]:
         part = slice(*np.searchsorted(match.times, [half.start - 1e-6, half.end + 1e-6]))
         found[half.number] = home_end(match.positions[:, part], teams)
     return {number: end for number, end in found.items() if end}
+
+
+def translate_kind(event, tells_foot: bool) -> tuple[str, str, str, tuple[str, ...], bool | None]:
+    """Kind, part, side, details, success of one of kloppy's events. tells_foot: left feet are told from right ones."""
+    names = [_name_of_qualifier(one) for one in getattr(event, "qualifiers", None) or ()]
+    result = getattr(getattr(event, "result", None), "name", "")
+    success = True if result in _GOOD else False if result in _BAD else None
+    kind = _KINDS.get(event.event_type.name) or _BY_NAME.get(str(event.event_name).lower(), "other")
+    details = [_DETAILS[name] for name in names if name in _DETAILS]
+    if "AERIAL" in names and kind == "tackle":
+        kind = "aerial"
+    if kind in ("aerial", "tackle") and result == "LOST":
+        details.append("lost")
+    part, side = next((_PARTS[name] for name in names if name in _PARTS), ("", ""))
+    if not part and kind == "pass":
+        part, side = next((_PASSES[name] for name in names if name in _PASSES), ("", ""))
+    if "throw-in" in details:
+        part, side = "hand", ""
+    if event.event_type.name == "GOALKEEPER":
+        kind = next((_BY_KEEPER[name] for name in names if name in _BY_KEEPER), kind)
+        part = part or "hand"
+    if not tells_foot or part != "foot":
+        side = ""
+    return kind, part, side, tuple(dict.fromkeys(details)), success
+
+
+def _name_of_qualifier(qualifier) -> str:
+    value = getattr(qualifier, "value", None)
+    return str(getattr(value, "name", value))

@@ -1,4 +1,5 @@
-"""Which tracked player somebody in a file of events is: by id, by shirt number, by name."""
+"""What a provider's people wrote down of a match: passes, shots, saves, in one form for all of them; and which tracked
+player each of its people is: by id, by shirt number, by name."""
 
 from __future__ import annotations
 
@@ -7,9 +8,54 @@ import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from ...motion.track.match_data import REFEREE, Match, MatchPlayer
+from ..annotation.event_words import EVENT_KINDS
+from ..motion.track.match_data import REFEREE, Match, MatchPlayer
+
+NOT_PLAYED = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "none")
+"""Kinds that are no touch of the ball."""
+
+CERTAIN = frozenset(kind.name for kind in EVENT_KINDS if kind.touch == "certain")
+"""Kinds that are a touch for certain."""
 
 _OTHER = {"home": "away", "away": "home"}
+
+
+@dataclass(frozen=True, kw_only=True)
+class MatchEvent:
+    """Somebody did something.
+
+    time: s from the begin of its period, on the events' own clock. period: 1 for the first. player: the tracking's id,
+    "" where he is not known. team: "home", "away" or "". kind: of `annotation.event_words.KINDS`. part: "foot",
+    "head", "chest", "hand" or "". side: "left", "right" or "". details: further words ("throw-in", "lost"). said: how
+    the provider calls it. success: None where it does not say. place: (x, y) m on the tracking's pitch, or NaN."""
+
+    time: float
+    period: int
+    player: str
+    team: str
+    kind: str
+    part: str = ""
+    side: str = ""
+    details: tuple[str, ...] = ()
+    said: str = ""
+    success: bool | None = None
+    place: tuple[float, ...] = (float("nan"), float("nan"))
+
+    @property
+    def played(self) -> bool:
+        """Whether the ball is touched, as far as is known."""
+        return self.kind not in NOT_PLAYED
+
+
+@dataclass(frozen=True)
+class MatchEvents:
+    """All events of a match by period and time. provider: whose form they had. where: the file, for messages. notes:
+    what was guessed or is missing, for people."""
+
+    events: tuple[MatchEvent, ...]
+    provider: str
+    where: str = "events"
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -37,8 +83,7 @@ class Who:
 def same_players(everybody: Sequence[Who], match: Match | None) -> tuple[dict[Who, tuple[str, str]], list[str]]:
     """Who -> (id, team) in the match, of those who are found, and notes.
 
-    Feeds may call the other team home: the way round in which more are found counts.
-    """
+    Feeds may call the other team home: the way round in which more are found counts."""
     if match is None:
         return {}, []
     players = [player for player in match.players if player.team != REFEREE]

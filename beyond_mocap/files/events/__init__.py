@@ -1,1 +1,0 @@
-"""Events of a match: providers' files and plain tables."""
