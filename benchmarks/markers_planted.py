@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks import markdown
+from benchmarks import effort
 from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.cleaning.clean import clean
@@ -72,7 +72,7 @@ def truth_table() -> list[str]:
         "with its filters. Angles: the whole angle between found and true joint rotation, all axes at once, root mean "
         "square over frames and joints, each segment's constant offset over the clip taken off (target 2); raw: with "
         "it. Centres: hips, knees, ankles, shoulders, elbows, wrists, in the world (target 10 mm).", "",
-        *markdown.head([
+        *effort.format_head([
             "clip", "markers", "static", "angles deg", "raw deg", "centres mm", "p95 mm",
             "residual mm", "one segment mm", "worst angle", "worst centre",
         ]),
@@ -86,12 +86,12 @@ def truth_table() -> list[str]:
 
 def bone_table() -> list[str]:
     """The same without skin and noise: what the road itself leaves."""
-    lines = markdown.head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
+    lines = effort.format_head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
     for name, marker_set in ON_BONE:
         known = planted(clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
         made = again(known, True, settings(marker_set))
         error = off(known, made)
-        lines.append(markdown.row([
+        lines.append(effort.format_row([
             name, marker_set, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
             f"{1e3 * error.centre:.1f}", _rms_mm(made.solved.residual),
         ]))  # fmt: skip
@@ -104,13 +104,12 @@ def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
         made = again(known, static, settings(marker_set))
         error = off(known, made)
     except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
-        return markdown.row([*begin, f"failed: {problem}"[:160], *[""] * 7])
+        return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
     solved = made.solved
-    return markdown.row([
+    return effort.format_row([
         *begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}", f"{1e3 * error.centre:.1f}",
-        f"{1e3 * error.worst_centre:.1f}",
-        _rms_mm(solved.residual), _rms_mm(solved.single), _worst(error.angles, np.degrees(1.0), 1),
-        _worst(error.centres, 1e3, 0),
+        f"{1e3 * error.worst_centre:.1f}", _rms_mm(solved.residual), _rms_mm(solved.single),
+        _worst(error.angles, np.degrees(1.0), 1), _worst(error.centres, 1e3, 0),
     ])  # fmt: skip
 
 
@@ -125,7 +124,7 @@ def _worst(of: dict[str, float], scale: float, digits: int) -> str:
 
 def filter_table() -> list[str]:
     """The same planted throw and walk by each filter."""
-    lines = markdown.head(
+    lines = effort.format_head(
         ["clip", "filter", "angles deg", "centres mm", "fastest hand m/s", "true", "hand's acceleration off"]
     )
     for name, noise in (("walk", 5e-4), ("throw", 5e-4), ("throw", 2e-3)):
@@ -134,7 +133,7 @@ def filter_table() -> list[str]:
         for chosen in ("none", "butterworth", "kalman"):
             made = again(known, True, settings(marker_set, filter=chosen, plant=False))
             error, (found, true, accelerated) = off(known, made), _hand(known, made.motion)
-            lines.append(markdown.row([
+            lines.append(effort.format_row([
                 f"{name}, noise {1e3 * noise:g} mm", chosen, f"{np.degrees(error.angle):.2f}",
                 f"{1e3 * error.centre:.1f}", f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2",
             ]))  # fmt: skip
@@ -159,7 +158,7 @@ def fault_table() -> list[str]:
         "Hidden: share of the samples that are hidden; filled: of the hidden ones that have a place again, how far "
         "they are from where the marker was. Mended: planted faults after which the samples are right; false: what is "
         "told of where nothing was planted; off afterwards: how far all samples are from the truth.", "",
-        *markdown.head([
+        *effort.format_head([
             "clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps mended", "jumps mended", "unlabeled back",
             "false swaps, jumps", "off afterwards mm p99", "frames/s",
         ]),
@@ -184,7 +183,7 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
     hidden = ~np.isfinite(before[..., 0])
     filled = hidden & np.isfinite(apart)
     gone = 1e3 * apart[filled]
-    return markdown.row([
+    return effort.format_row([
         name, marker_set, f"{100 * hidden.mean():.0f} %", f"{100 * filled.sum() / max(hidden.sum(), 1):.0f} %",
         f"{np.sqrt(np.mean(gone**2)):.1f}, {np.percentile(gone, 95):.1f}" if len(gone) else "",
         *(_mended(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")), _false(known, cleaned.report),
@@ -220,12 +219,12 @@ def speed_table() -> list[str]:
     """Frames a second of the pose alone, on one core."""
     from beyond_mocap.markers.pose.pose import solve
 
-    lines = markdown.head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
+    lines = effort.format_head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
     for name, marker_set in TIMED:
         known = planted(clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
         made = again(known, True, settings(marker_set))
         rates = [_rate(made, solve, weights) for weights in (True, False)]
-        lines.append(markdown.row([
+        lines.append(effort.format_row([
             name, f"{marker_set}, {len(made.model.markers)}", str(len(made.model.skeleton)), str(len(made.trial)),
             *(f"{rate:.0f}" for rate in rates),
         ]))  # fmt: skip

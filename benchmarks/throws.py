@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks import effort, markdown
+from benchmarks import effort
 from beyond_mocap.base.errors import BeyondMocapError
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
@@ -65,13 +65,13 @@ def unseen(action: str, fps: float) -> tuple:
 
 def unseen_table(model, action: str) -> list[str]:
     """What the model makes of movements that it never saw, scaled by height."""
-    lines = markdown.head([
+    lines = effort.format_head([
         f"{len(UNSEEN)} unseen people, {EACH} each", "left hand, right hand, left foot, right foot, cm",
         "networks alone, cm", "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits",
     ])  # fmt: skip
     for words, options in (("networks alone (target 3 cm)", RAW), ("corrected", FULL)):
         report = evaluate_throws(model, unseen(action, model.settings.fps), options).report()
-        lines.append(markdown.row([
+        lines.append(effort.format_row([
             words, _centimetres(report["deviation_m"]), _centimetres(report["network_deviation_m"]),
             *(_number(report[name], form) for name, form in (("impact_m", ".2f"), ("head", ".1f"),
                                                              ("head_share", ".2f"),
@@ -82,7 +82,7 @@ def unseen_table(model, action: str) -> list[str]:
 
 def target_table(model, action: str) -> list[str]:
     """Targets that nobody aimed at, after the last correction."""
-    lines = markdown.head(
+    lines = effort.format_head(
         ["target, m", "ball off, m (0.10)", "moved, cm (5)", "turned, °", "m/s", "raw, cm (3)", "seconds"]
     )
     for number, target in enumerate(TARGETS[action]):
@@ -92,12 +92,11 @@ def target_table(model, action: str) -> list[str]:
         try:
             took, thrown = effort.seconds(lambda order=order: throw_at(model, order))
         except BeyondMocapError as error:
-            lines.append(markdown.row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
+            lines.append(effort.format_row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
             continue
-        lines.append(markdown.row([
+        lines.append(effort.format_row([
             _place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
-            f"{np.degrees(thrown.turned):.1f}",
-            f"{thrown.speed:.1f}", f"{100 * thrown.raw_deviation:.1f}",
+            f"{np.degrees(thrown.turned):.1f}", f"{thrown.speed:.1f}", f"{100 * thrown.raw_deviation:.1f}",
             f"{took:.2f} for {thrown.motion.duration:.1f}",
         ]))  # fmt: skip
     return lines
@@ -130,7 +129,7 @@ def networks_row(kind: str, points: int, layers: int, units: int) -> str:
 
     spent, _ = effort.seconds(all_frames, _RUNS)
     count = sum(network.parameters for network in made)
-    return markdown.row(
+    return effort.format_row(
         [kind, str(points), str(layers), str(units), f"{count / 1e6:.2f}", f"{2 * count / 1e6:.1f}", f"{spent:.3f}"]
     )
 
@@ -154,16 +153,16 @@ def throw_rows(model: ThrowModel, name: str) -> list[str]:
                           ("start pose, inverse kinematics, limits", Options())):  # fmt: skip
         generate(model, description, options=options)
         spent, done = effort.seconds(lambda options=options: generate(model, description, options=options), _RUNS)
-        rows.append(markdown.row([name, str(len(description)), what, str(done.iterations), f"{spent:.3f}"]))
+        rows.append(effort.format_row([name, str(len(description)), what, str(done.iterations), f"{spent:.3f}"]))
     return rows
 
 
 def speed_tables() -> list[str]:
     """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
-    lines = markdown.head((
+    lines = effort.format_head((
         "networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
         f"s for {FRAMES} frames (target 0.12)",
     ))  # fmt: skip
     lines += [networks_row(*size) for size in SIZES]
-    lines += ["", *markdown.head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
+    lines += ["", *effort.format_head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
     return lines + throw_rows(shipped_model("throw"), "throw.npz")

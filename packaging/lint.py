@@ -23,8 +23,7 @@ def lint_stage(folder, packages, platform):
         *(f"wheel {name} is listed but not there" for name in listed if name not in there),
         *(f"wheel {name} is there but not listed" for name in sorted(there) if name not in listed),
         *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
-        *_copyright(manifest, packages),
-        *_coverage(listed, packages, platform),
+        *_copyright(manifest, packages), *_coverage(listed, packages, platform),
     ]
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..files.bvh import bvh
 from ..path_editing.apart import Limits, resolved
 from ..path_editing.collisions import collisions
-from ..path_editing.follower import Change, Follower
+from ..path_editing.detour import Change, Follower
 from ..path_editing.ride import Ridden, RideSettings, RideSource, ride
 
 _ROUNDS = 3

@@ -101,7 +101,7 @@ def _write_tables(options, take, report: dict | None) -> None:
 def _path(options):
     """The new path."""
     from ..path_editing import path_line
-    from ..path_editing.path_csv import read_curve
+    from ..path_editing.path_line import read_curve
 
     points = read_curve(options.path)
     try:

@@ -45,10 +45,8 @@ from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.wanted import Wanted, WantedKey
 from ..synthesis.synthesize import look_of
 from ..synthesis.take import Take
-from .alike import alike
-from .links import BoneWeights
-from .orders import HitOrder, Stance
-from .way import Placed, needed, placed, way
+from .links import BoneWeights, alike
+from .way import HitOrder, Placed, Stance, needed, placed, way
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
@@ -88,16 +86,9 @@ class PlayerMotion:
 
 
 def player_motion(
-    library: Library,
-    stance: Stance,
-    orders: Sequence[HitOrder],
-    ball: BallPath,
-    ball_radius: float = BALL_RADIUS,
-    frames: int | None = None,
-    fps: float = 30.0,
-    settings: BodySettings = BodySettings(),
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    library: Library, stance: Stance, orders: Sequence[HitOrder], ball: BallPath, ball_radius: float = BALL_RADIUS,
+    frames: int | None = None, fps: float = 30.0, settings: BodySettings = BodySettings(),
+    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> PlayerMotion:
     """The motion of a player who begins at `stance` and strikes as `orders` say.
 

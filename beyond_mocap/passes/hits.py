@@ -105,11 +105,7 @@ class Hits:
 
 
 def analyse(
-    motion: Motion,
-    part: str = "foot",
-    side: str = "right",
-    threshold: float | None = None,
-    joint: str | None = None,
+    motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None, joint: str | None = None,
     tool: Tool | None = None,
 ) -> Hits:
     """Where `part` of one side can strike a ball.

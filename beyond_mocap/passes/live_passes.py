@@ -23,10 +23,10 @@ from ..motion.track.ball_path import BallPath
 from .bodies import BodySettings, least_seconds, player_motion
 from .hit_library import kind_of
 from .hits import HitMotion
-from .orders import Stance
 from .pass_plan import PassPlan
 from .pass_scene import GROUND, Example, Pass, PassScene
 from .passes import ball_of, ball_path, bone_weights, planned
+from .way import Stance
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""
@@ -119,14 +119,8 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
 
 
 def answer(
-    library: Library,
-    rally: Rally,
-    now: float,
-    hit: HitMotion,
-    target: str,
-    bounces: int = 0,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
+    library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
+    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> Piece:
     """The pass with which the holder answers a hit of the user: the library's most alike motion (eq. 2), to `target`.
 

@@ -20,10 +20,15 @@ from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..base.vectors import unit_vectors
 from ..motion import quaternion
-from .pass_costs import (
+from .pass_court import (  # fmt: skip
+    ON_TARGET,
     TIMES,
     TRUNK_TO,
     UPRIGHT,
+    Court,
+    Link,
+    Natural,
+    Site,
     against_the_part,
     arrivals,
     cost_of_moments,
@@ -32,12 +37,12 @@ from .pass_costs import (
     rising,
     spun,
     through_body,
+    turned,
     ways_of,
     wished,
-)  # fmt: skip
-from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
+)
 from .pass_scene import GROUND, RECEIVE, Pass
-from .strike_moments import StrikeMoments, launched_from
+from .strike_choice import StrikeMoments, launched_from
 
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""

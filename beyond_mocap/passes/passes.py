@@ -26,12 +26,11 @@ from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .hit_library import MatchWeights
 from .hits import HitMotion, strongest
 from .links import BoneWeights
-from .orders import HitOrder, Stance
 from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
-from .strike_choice import Choice, unsaid
-from .strike_moments import StrikeMoments, strike_moments
+from .strike_choice import Choice, StrikeMoments, strike_moments, unsaid
+from .way import HitOrder, Stance
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
@@ -81,9 +80,7 @@ class Passes:
 
 
 def passes(
-    library: Library,
-    scene: PassScene,
-    progress: Callable[[float, str], None] | None = None,
+    library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> Passes:
     """The scene played with the motions of a library. The same scene and library give the same bits.
@@ -129,9 +126,7 @@ def _part_of(report, number: int, players: tuple[Player, ...]):
 
 
 def planned(
-    library: Library,
-    scene: PassScene,
-    progress: Callable[[float, str], None] | None = None,
+    library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
     cancelled: Callable[[], bool] | None = None,
 ) -> PassPlan:
     """Strikes and flights of a scene alone, for live editing. Errors as for `passes`."""

@@ -92,14 +92,8 @@ class Steps:
 
 
 def follow(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    fps: float,
-    ground: Ground,
-    sole: float,
-    steps: Steps | None = None,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float, ground: Ground,
+    sole: float, steps: Steps | None = None,
 ) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
@@ -175,9 +169,7 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
     return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
-def _on_own_ground(
-    feet: list[Foot], own: np.ndarray, sole: float, scale: float
-) -> tuple[list[Foot], np.ndarray]:
+def _on_own_ground(feet: list[Foot], own: np.ndarray, sole: float, scale: float) -> tuple[list[Foot], np.ndarray]:
     """Feet on their ground, `own` (T, 2) m high, since the floors of recordings are uneven and drift; metres (T,) by
     which the body is off it: by as much as the feet that stand, and as they were in the air."""
     above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
@@ -230,12 +222,8 @@ def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Fo
     """The foot tipped (T, 4) about its toe and brought up by rise (T,) m; its hip goes up by `up` (T,) m."""
     toe = foot.toe + rise[:, None] * _UP
     return replace(
-        foot,
-        hip=foot.hip + up[:, None] * _UP,
-        toe=toe,
-        heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
-        rotation=quaternion.multiply(tip, foot.rotation),
-        left=quaternion.rotate(tip, foot.left),
+        foot, hip=foot.hip + up[:, None] * _UP, toe=toe, heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
+        rotation=quaternion.multiply(tip, foot.rotation), left=quaternion.rotate(tip, foot.left),
     )
 
 

@@ -36,8 +36,7 @@ def figures(source, ridden, path, ground=None) -> dict:
         "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
         "root_error_own_m": _spread(_own_error(source, own)),
         "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
-        "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
-        "seam_jerk": _seams(source, ridden, own, pelvis),
+        "kept_speed": kept_speed(source, ridden, own, pelvis, frames), "seam_jerk": _seams(source, ridden, own, pelvis),
         "ground_mm": None, "skate": None, "knee_jerk_ratio": None, "foot_correction_m": None, "ik_miss_share": None,
     }  # fmt: skip
     if not source.humanoid:
@@ -122,8 +121,7 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
     own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
     used = np.unique(frames)
     skate = {
-        **_skate("", mine, points, ridden.motion.fps),
-        **_skate("source_", own, own_points, source.motion.fps, used),
+        **_skate("", mine, points, ridden.motion.fps), **_skate("source_", own, own_points, source.motion.fps, used),
         **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
     }
     way = source.path.at(np.arange(len(own)) / source.motion.fps)
@@ -165,8 +163,7 @@ def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: 
         speeds, point = speeds[kept], point[kept]
     travel = feet.stance_travel(places[:, :, 1], feet.stances(flat))
     return {
-        f"{name}contact_cm_s": 100.0 * _mean(speeds),
-        f"{name}point_cm_s": 100.0 * _mean(point),
+        f"{name}contact_cm_s": 100.0 * _mean(speeds), f"{name}point_cm_s": 100.0 * _mean(point),
         f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
         f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float)),
     }

@@ -27,14 +27,23 @@ from ..synthesis.construct.banking import banked, bent_forward, missing_lean
 from .cycle import cycled
 from .detour import with_detours
 from .foot_ride import LONGEST, Ground, Steps, follow
-from .ground_contact import footing, is_level, mesh_surface, path_surface
+from .ground_contact import curvature, footing, is_level, mesh_surface, path_surface, share, steep, tight
+from .ground_contact import told as tight_told
 from .loops import Loop, find_loops
-from .path_curvature import curvature, share, steep, tight
-from .path_curvature import told as tight_told
-from .path_end import Ending, ending
-from .path_fit import KINDS, fit, fit_polynomial, fit_spline
-from .path_frame import MovingFrame, Residuals, check_frame, moving_frame, placed, relative
+from .path_frame import (
+    KINDS,
+    MovingFrame,
+    Residuals,
+    check_frame,
+    fit,
+    fit_polynomial,
+    fit_spline,
+    moving_frame,
+    placed,
+    relative,
+)
 from .path_time import (
+    Ending,
     Timing,
     Way,
     Wishes,
@@ -42,6 +51,7 @@ from .path_time import (
     by_arc_length,
     by_time,
     by_way,
+    ending,
     parameter_at,
     shown,
     stretched,

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.striking import FOOT_RADIUS
+from ..ball.flight import meets_wall
 from ..ball.physics import FOOTBALL, Ball
-from ..ball.wall import meets_wall
 from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..base.time_series import interpolate

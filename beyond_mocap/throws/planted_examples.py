@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline, format_timeline
+from ..ball.flight import meets_wall
 from ..ball.physics import BASEBALL
-from ..ball.wall import meets_wall
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
 from ..files.whole import atomic_write, whole_folder

@@ -15,10 +15,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ..ball.arcs import arcs, out_of_reach
-from ..ball.flight import Flight, Launch, fly
-from ..ball.impact import crossing
+from ..ball.flight import Flight, Launch, crossing, fly
 from ..ball.physics import BALLS, FASTEST, THROWN, Ball
+from ..ball.shot import arcs, is_out_of_reach
 from ..base.arctangent import arctan2
 from ..base.errors import InputError
 from ..motion import quaternion
@@ -383,7 +382,7 @@ class _Work:
         model = f"the model's fastest example has {own:.0f}"
         for most, what in ((self.fastest, human), (_BEYOND_EXAMPLES * own, model)):
             slowest = _slowest_without_air(start, end, self.ball.gravity)
-            if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
+            if slowest > most or slowest > _NEAR * most and is_out_of_reach(start, end, self.ball, most, spin):
                 far = float(np.linalg.norm(self.target[:2] - self._where()))
                 raise InputError("target", f"{far:.0f} m away: that takes more than {most:.0f} m/s",
                                  f"at most {most:.0f} m/s, {what}", "choose a nearer or lower target")  # fmt: skip

@@ -16,8 +16,8 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..annotation.labels import list_labels
+from ..ball.flight import meets_wall
 from ..ball.physics import BASEBALL, FOOTBALL, Ball
-from ..ball.wall import meets_wall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
 from ..files.content import content

@@ -61,7 +61,7 @@ def _hangs_on_rider(body) -> bool:
 
 def _follower(scene, body, until: float):
     """Where its hips are over the ground. InputError past the time `until`."""
-    from ...beyond_mocap.path_editing.follower import Follower
+    from ...beyond_mocap.path_editing.detour import Follower
 
     if perf_counter() > until:
         raise _late()

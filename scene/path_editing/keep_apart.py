@@ -44,7 +44,7 @@ class Trial:
 
     def follower(self, change, may_change: bool = True):
         """The rider with a `Change` as a body of the core."""
-        from ...beyond_mocap.path_editing.follower import Follower
+        from ...beyond_mocap.path_editing.detour import Follower
 
         ridden = self.ridden(change)
         fps = ridden.motion.fps
@@ -75,7 +75,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
     cannot ride.
     """
     from ...beyond_mocap.path_editing.apart import resolved
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     scene = context.scene
     context.view_layer.update()
@@ -104,7 +104,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
     """Ask riders for these changes, instead of those before, and bring them up to date. InputError, and all as before,
     where one of them cannot follow."""
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     rides = [body.beyond_mocap_ride for body in bodies]
     before = [(ride.delay, ride.added, ride.detours, ride.agreed) for ride in rides]
@@ -148,7 +148,7 @@ def _own_delay(ride) -> float:
 
 def _others(scene, bodies) -> list:
     """Other riders as they are; those that cannot ride just now, which is told at them, stand in nobody's way."""
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     found = []
     for body in all_riders(scene):

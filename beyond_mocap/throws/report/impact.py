@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...ball.flight import Launch, fly
-from ...ball.impact import crossing
+from ...ball.flight import Launch, crossing, fly
 from ...ball.physics import BASEBALL, Ball
 from ...motion import quaternion
 from ...motion.between_frames import cubic_at

@@ -5,10 +5,9 @@ import csv
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.tracked.ends import ball_ends
-from beyond_mocap.ball.tracked.kinds import keeper_kind, keepers, kind_of, leaves_line, part_of
+from beyond_mocap.ball.tracked.kinds import ball_ends, keeper_kind, keepers, kind_of, leaves_line, part_of
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve
-from beyond_mocap.ball.tracked.who import choose
+from beyond_mocap.ball.tracked.touches import choose
 from beyond_mocap.files.touches_csv import COLUMNS, write_touches
 
 

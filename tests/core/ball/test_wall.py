@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from beyond_mocap.ball.flight import meets_wall
 from beyond_mocap.ball.physics import BASEBALL, FOOTBALL, Ball
-from beyond_mocap.ball.wall import meets_wall
 
 FREE = Ball("free", 0.05, 0.2, 9.81)
 

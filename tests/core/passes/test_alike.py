@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.passes.alike import alike, bones
-from beyond_mocap.passes.links import BONES, BoneWeights, aligned
+from beyond_mocap.passes.links import BONES, BoneWeights, aligned, alike, bones
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.path_costs import Alike, PathCosts, Weights

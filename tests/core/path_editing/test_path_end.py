@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.path_editing.path_end import ending
+from beyond_mocap.path_editing.path_time import ending
 
 FPS = 30.0
 ARC = 0.05 * np.arange(100)  # 4.95 m

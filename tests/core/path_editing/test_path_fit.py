@@ -9,7 +9,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.motion import place
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.path_fit import fit, fit_polynomial, fit_spline, places_on_ground
+from beyond_mocap.path_editing.path_frame import fit, fit_polynomial, fit_spline, places_on_ground
 from beyond_mocap.synthetic.gait import gait
 
 TIMES = np.arange(600) / 60.0

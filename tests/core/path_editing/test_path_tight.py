@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.path_editing.path_curvature import curvature, share
+from beyond_mocap.path_editing.ground_contact import curvature, share
 from beyond_mocap.path_editing.path_line import through
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
 from beyond_mocap.synthetic.gait import gait

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import Launch, crossing, fly
 from beyond_mocap.ball.physics import BASEBALL
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify

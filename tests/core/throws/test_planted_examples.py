@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import read_clip_annotations
+from beyond_mocap.ball.flight import meets_wall
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.ball.wall import meets_wall
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh

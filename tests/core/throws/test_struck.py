@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.striking import FOOT_RADIUS, ball_gap
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import Launch, crossing, fly
 from beyond_mocap.ball.physics import FOOTBALL
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics

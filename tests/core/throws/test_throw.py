@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import crossing, fly
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
