@@ -53,12 +53,10 @@ def scene_row(name: str, library: Library, label: str) -> str:
     took, made = effort.seconds(lambda: passes(library, scene), 1)
     apart, off = gaps(made)
     moved = np.concatenate([player.moved for player in made.players])
-    return format_row([
-        f"{name}, {label}", str(len(made.plan.strikes)), str(len(apart)),
-        f"{1000 * np.median(apart):.1f} / {1000 * apart.max():.1f}", f"{1000 * off.max():.1f}",
-        f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}",
-        str(len(made.warnings)),
-    ])  # fmt: skip
+    return format_row([f"{name}, {label}", str(len(made.plan.strikes)), str(len(apart)),
+                       f"{1000 * np.median(apart):.1f} / {1000 * apart.max():.1f}", f"{1000 * off.max():.1f}",
+                       f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}",
+                       str(len(made.warnings))])
 
 
 def take_rows(name: str, library: Library) -> list[str]:
@@ -66,18 +64,15 @@ def take_rows(name: str, library: Library) -> list[str]:
     rows = []
     for number in (1, 2, 3, 4, 5):
         track, timeline = scenario(number)
-        plan = Plan(
-            track=track, timeline=timeline, library=library.folder, nearest=True, method="path", solve_touches=True
-        )
+        plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True, method="path",
+                    solve_touches=True)
         report = evaluate(synthesize(library, plan), track, library)
         for key in report["keys"]:
             gap, moved = key["met_gap_m"], key["solved_time_s"]
             if gap is not None and np.isfinite(gap):
-                rows.append(format_row([
-                    f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
-                    "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}", cell(key["ball_shift_m"]),
-                    cell(key["time_error_s"]),
-                ]))  # fmt: skip
+                rows.append(format_row([f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
+                                        "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}",
+                                        cell(key["ball_shift_m"]), cell(key["time_error_s"])]))
     return rows
 
 

@@ -146,31 +146,28 @@ def line(measured: Measured) -> list[str]:
     score = measured.score
     late = np.abs(score.errors)
     median, p95, share = residuals(measured.solved)
-    return [
-        measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}",
-        f"{score.f1:.3f}", str(len(score.doubtful)),
-        f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
-        told_apart(measured), f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}", f"{100 * share:.0f} %",
-    ]  # fmt: skip
+    return [measured.name, str(len(measured.reading.touches)), f"{score.precision:.3f}", f"{score.recall:.3f}",
+            f"{score.f1:.3f}", str(len(score.doubtful)),
+            f"{1000 * np.median(late):.0f} / {1000 * np.percentile(late, 95):.0f}" if len(late) else "-",
+            told_apart(measured), f"{score.offset:.2f}", f"{100 * median:.1f} / {100 * p95:.0f}",
+            f"{100 * share:.0f} %"]
 
 
-COLUMNS = (
-    "feed", "touches", "precision", "recall", "F1 at 0.1 s, right player", "doubtful", "time off, ms (median / p95)",
-    "part right", "offset s", "path to measured samples, cm (median / p95)", "measured",
-)
+COLUMNS = ("feed", "touches", "precision", "recall", "F1 at 0.1 s, right player", "doubtful",
+           "time off, ms (median / p95)", "part right", "offset s", "path to measured samples, cm (median / p95)",
+           "measured")
 
 
 def all_measured(dutch: Match, half: Match, solved: SolvedBall) -> list[Measured]:
     """Every feed. solved: the whole half."""
-    return [
-        by_hand("dutch", dutch), by_hand("nl2019", half, solved=solved), by_hand("dutch, read later", dutch, LATER),
-        by_hand("nl2019, read later", half, LATER, solved), by_hand("dutch, no heights", thinned(dutch, 1, False)),
-        by_hand("nl2019, no heights", thinned(half, 1, False)), by_hand("dutch, 12.5 Hz", thinned(dutch, 2)),
-        by_hand("nl2019, 12.5 Hz", thinned(half, 2)), by_hand("dutch, 8.3 Hz, no heights", thinned(dutch, 3, False)),
-        against_events(dutch), planted("made, 25 Hz, 8 cm"), planted("made, 25 Hz, 8 cm, half filled", filled=0.5),
-        planted("made, 25 Hz, 8 cm, no heights", heights=False), planted("made, 10 Hz, 8 cm", fps=10.0),
-        planted("made, 10 Hz, 8 cm, no heights", fps=10.0, heights=False),
-    ]  # fmt: skip
+    return [by_hand("dutch", dutch), by_hand("nl2019", half, solved=solved), by_hand("dutch, read later", dutch, LATER),
+            by_hand("nl2019, read later", half, LATER, solved), by_hand("dutch, no heights", thinned(dutch, 1, False)),
+            by_hand("nl2019, no heights", thinned(half, 1, False)), by_hand("dutch, 12.5 Hz", thinned(dutch, 2)),
+            by_hand("nl2019, 12.5 Hz", thinned(half, 2)),
+            by_hand("dutch, 8.3 Hz, no heights", thinned(dutch, 3, False)), against_events(dutch),
+            planted("made, 25 Hz, 8 cm"), planted("made, 25 Hz, 8 cm, half filled", filled=0.5),
+            planted("made, 25 Hz, 8 cm, no heights", heights=False), planted("made, 10 Hz, 8 cm", fps=10.0),
+            planted("made, 10 Hz, 8 cm, no heights", fps=10.0, heights=False)]
 
 
 def section() -> list[str]:
@@ -238,9 +235,8 @@ class Score:
         return 2.0 * self.precision * self.recall / both if both else 0.0
 
 
-def scored(
-    times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE, offset: float = 0.0
-) -> Score:
+def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
+           offset: float = 0.0) -> Score:
     """Found touches (times s, players) against a reading. Those outside its stretches are left out."""
     times = np.asarray(times, float) - offset
     inside = [i for i in np.argsort(times, kind="stable") if _within(times[i], reading.stretches)]
@@ -249,16 +245,13 @@ def scored(
     rest = [i for i in inside if i not in found]
     doubtful = [i for i in rest if any(_covers(doubt, times[i], players[i], tolerance) for doubt in reading.doubts)]
     read = {i for i, _ in right}
-    return Score(
-        tuple(right), tuple(i for i in range(len(reading.touches)) if i not in read),
-        tuple(int(i) for i in rest if i not in doubtful), tuple(int(i) for i in doubtful),
-        np.array([times[found] - reading.touches[read].time for read, found in right]), offset,
-    )  # fmt: skip
+    return Score(tuple(right), tuple(i for i in range(len(reading.touches)) if i not in read),
+                 tuple(int(i) for i in rest if i not in doubtful), tuple(int(i) for i in doubtful),
+                 np.array([times[found] - reading.touches[read].time for read, found in right]), offset)
 
 
-def scored_by_events(
-    times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE, most: float = 4.0
-) -> Score:
+def scored_by_events(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
+                     most: float = 4.0) -> Score:
     """`scored` with the one offset, up to `most` seconds either way, that gives the greatest F1."""
     coarse = np.arange(-most, most + 1e-9, tolerance / 2.0)
     best = max(coarse, key=lambda offset: _roughly(times, players, reading, tolerance, offset))

@@ -94,10 +94,8 @@ def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
         return "peak memory: not known on this system"
     track, words = scenario_files(number)
     with tempfile.TemporaryDirectory() as out:
-        command = [
-            sys.executable, "-m", "beyond_mocap", "synthesize", "--library", folder, "--cache", cache, "--track", track,
-            "--annotations", words, "--out", Path(out) / "out.bvh", "--nearest",
-        ]
+        command = [sys.executable, "-m", "beyond_mocap", "synthesize", "--library", folder, "--cache", cache, "--track",
+                   track, "--annotations", words, "--out", Path(out) / "out.bvh", "--nearest"]
         if LIBRARIES[name]:
             command += ["--unit", str(LIBRARIES[name])]
         quiet = subprocess.DEVNULL

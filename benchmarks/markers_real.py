@@ -19,20 +19,16 @@ from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
 from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
 from beyond_mocap.synthetic.throws import throw
 
-TRIALS = (
-    ("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None), ("kinematics_tennis_serve.c3d", None),
-    ("kinematics_tennis_serve_nan.c3d", None), ("sprinter_run0350cms.trc", "sprinter_static.trc"),
-    ("sprinter_run0350cms.trc", None), ("sprinter_run0900cms.trc", "sprinter_static.trc"),
-    ("PiG_Motion3_FF.c3d", "PiG_Calibration3_FF.c3d"), ("PiG_Motion3_FF.c3d", None),
-    ("whole_body_stick_puck.c3d", None),
-)
+TRIALS = (("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None),
+          ("kinematics_tennis_serve.c3d", None), ("kinematics_tennis_serve_nan.c3d", None),
+          ("sprinter_run0350cms.trc", "sprinter_static.trc"), ("sprinter_run0350cms.trc", None),
+          ("sprinter_run0900cms.trc", "sprinter_static.trc"), ("PiG_Motion3_FF.c3d", "PiG_Calibration3_FF.c3d"),
+          ("PiG_Motion3_FF.c3d", None), ("whole_body_stick_puck.c3d", None))
 """Trial and static trial."""
 FOLDER = DATA / "markers"
 
-THROWS = (
-    (18.0, 30.0, "right", "overarm", 240.0, 15.0), (18.0, 36.0, "right", "overarm", 360.0, 25.0),
-    (12.0, 18.0, "left", "overarm", 200.0, 8.0), (10.0, 22.0, "right", "sidearm", 200.0, 0.0),
-)
+THROWS = ((18.0, 30.0, "right", "overarm", 240.0, 15.0), (18.0, 36.0, "right", "overarm", 360.0, 25.0),
+          (12.0, 18.0, "left", "overarm", 200.0, 8.0), (10.0, 22.0, "right", "sidearm", 200.0, 0.0))
 """Metres to the target, m/s, arm, style, frames a second, revolutions a second."""
 PITCHES = ("000870_003252_74_195_002_FF_808.c3d", "pitch_biodata.c3d")
 
@@ -56,11 +52,9 @@ def trial_table() -> list[str]:
     lines = [
         "Residual: model marker against seen one, of the pose; one segment: every cluster of at least three markers "
         "fitted alone, which knows no joints and no limits; written: of the motion after its filters.", "",
-        *effort.format_head([
-            "trial", "static", "set, markers, joints", "residual mm rms, p95", "one segment mm rms", "written mm rms",
-            "bones change", "standing feet cm/s, mm", "at a limit", "fastest turn deg/frame", "seconds",
-            "worst markers mm",
-        ]),
+        *effort.format_head(["trial", "static", "set, markers, joints", "residual mm rms, p95", "one segment mm rms",
+                             "written mm rms", "bones change", "standing feet cm/s, mm", "at a limit",
+                             "fastest turn deg/frame", "seconds", "worst markers mm"]),
     ]  # fmt: skip
     return lines + [_row(trial, static) for trial, static in TRIALS]
 
@@ -77,13 +71,11 @@ def _row(trial: str, static: str | None) -> str:
     limits = sorted(((share, joint) for joint, share in figures["limits"].items() if share > 0.05), reverse=True)[:3]
     slides = slide is not None and slide["contact_cm_s"] is not None
     feet = f"{slide['contact_cm_s']:.1f}, {slide['stance_mm_median'] or 0:.0f}" if slides else ""
-    return effort.format_row([
-        *begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
-        f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}", f"{near['output_rms']:.1f}",
-        f"{figures['bones_change_m']:.0e} m", feet,
-        ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _fastest(out), f"{took:.1f}",
-        ", ".join(f"{label} {far:.0f}" for far, label in worst),
-    ])  # fmt: skip
+    return effort.format_row([*begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
+                              f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}",
+                              f"{near['output_rms']:.1f}", f"{figures['bones_change_m']:.0e} m", feet,
+                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _fastest(out),
+                              f"{took:.1f}", ", ".join(f"{label} {far:.0f}" for far, label in worst)])
 
 
 def _fastest(out: Reconstruction) -> str:
@@ -98,10 +90,8 @@ def _fastest(out: Reconstruction) -> str:
 
 def planted_table() -> list[str]:
     """Each planted throw with its ball's marker seen in flight, seen late, and with none."""
-    lines = effort.format_head([
-        "throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames", "way off deg",
-        "told sigma ms, m/s",
-    ])  # fmt: skip
+    lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
+                                "way off deg", "told sigma ms, m/s"])
     for distance, speed, arm, style, fps, turns in THROWS:
         thrown = throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
         ball = PlantedBall(thrown.release, side=arm.title(), turns=turns)
@@ -134,11 +124,10 @@ def _release_row(name: str, how: str, known: Planted, trial, motion) -> str:
         return effort.format_row([name, how, f"{truth.speed:.1f}", f"failed: {problem}"[:120], *[""] * 4])
     late = found.time - truth.asked.release
     way = np.degrees(np.arccos(np.clip(found.direction @ truth.velocity / truth.speed, -1.0, 1.0)))
-    return effort.format_row([
-        name, f"{how} ({found.how})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
-        f"{100 * (found.speed / truth.speed - 1):+.1f} %", f"{1e3 * late:+.1f}, {late * fps:+.1f}", f"{way:.1f}",
-        f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}",
-    ])  # fmt: skip
+    return effort.format_row([name, f"{how} ({found.how})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
+                              f"{100 * (found.speed / truth.speed - 1):+.1f} %",
+                              f"{1e3 * late:+.1f}, {late * fps:+.1f}", f"{way:.1f}",
+                              f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}"])
 
 
 def radar_table() -> list[str]:
@@ -148,9 +137,7 @@ def radar_table() -> list[str]:
         body = made(trial, None)
         found = release(body.raw, body.motion)
         radar = found.radar
-        lines.append(effort.format_row([
-            trial, f"{found.speed:.1f}", "not told" if radar is None else f"{radar:.1f}",
-            "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %", f"{found.speed_sigma:.1f}",
-            f"{found.time:.3f}",
-        ]))  # fmt: skip
+        lines.append(effort.format_row([trial, f"{found.speed:.1f}", "not told" if radar is None else f"{radar:.1f}",
+                                        "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",
+                                        f"{found.speed_sigma:.1f}", f"{found.time:.3f}"]))
     return lines

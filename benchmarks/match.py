@@ -95,10 +95,8 @@ def crowd_section() -> list[str]:
     """Lines for results.md: SECONDS of a recorded half, made and measured."""
     with tempfile.TemporaryDirectory() as place:
         folder, cache, recordings = Path(place) / "match", Path(place) / "cache", DATA / "mocap" / "cmu10"
-        order = MatchOrder(
-            DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache, unit=CMU_UNIT,
-            start=SECONDS[0], end=SECONDS[1], figures=False,
-        )  # fmt: skip
+        order = MatchOrder(DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache,
+                           unit=CMU_UNIT, start=SECONDS[0], end=SECONDS[1], figures=False)
         took, result = seconds(lambda: make_match(order), 1)
         library = build(recordings, unit=CMU_UNIT, cache_dir=cache)
         made = f"- {len(result.done)} players made in {took:.1f} s of processor time, {len(result.failed)} failed"
@@ -115,12 +113,10 @@ def crowd_lines(folder: Path, library: Library) -> list[str]:
     kept = [edit.correction or Correction.none(fps) for _, edit in pairs]
     corrected = [applied(*each) for each in zip(motions, kept, firsts)]
     took, _ = seconds(lambda: kept_apart(motions, contacts, firsts, fps), 1)
-    return [
-        f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
-        f"without corrections: {figures(motions, contacts, firsts)}",
-        f"with them: {figures(corrected, contacts, firsts)}",
-        what_is_changed(kept, takes, firsts), f"kept apart anew in {took:.1f} s of processor time",
-    ]
+    return [f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
+            f"without corrections: {figures(motions, contacts, firsts)}",
+            f"with them: {figures(corrected, contacts, firsts)}", what_is_changed(kept, takes, firsts),
+            f"kept apart anew in {took:.1f} s of processor time"]
 
 
 def windows(match: Match) -> list[tuple[str, float]]:

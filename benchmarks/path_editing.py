@@ -25,15 +25,11 @@ from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
 CLIPS = {
     "cmu10": ("10_04", "train_walking_1", "train_walking_2", "train_walking_3", "train_running_1", "test_running_1"),
-    "lafan1": (
-        "walk1_subject1_walk2_filtered", "walk3_subject4_walk2_filtered", "run2_subject4_run2_filtered",
-        "pushAndStumble1_subject2_jog_filtered", "multipleActions1_subject4_walk2_filtered",
-        "fightAndSports1_subject1_backward_filtered",
-    ),
-    "bandai": (
-        "dataset-1_walk_normal_001", "dataset-1_walk_proud_001", "dataset-1_run_normal_001",
-        "dataset-1_dash_normal_001", "dataset-1_walk-left_normal_001", "dataset-1_walk-back_normal_001",
-    ),
+    "lafan1": ("walk1_subject1_walk2_filtered", "walk3_subject4_walk2_filtered", "run2_subject4_run2_filtered",
+               "pushAndStumble1_subject2_jog_filtered", "multipleActions1_subject4_walk2_filtered",
+               "fightAndSports1_subject1_backward_filtered"),
+    "bandai": ("dataset-1_walk_normal_001", "dataset-1_walk_proud_001", "dataset-1_run_normal_001",
+               "dataset-1_dash_normal_001", "dataset-1_walk-left_normal_001", "dataset-1_walk-back_normal_001"),
     "runs15": ("sie_humanoid3d_run_forward04", "sie_humanoid3d_run_forward12", "sie_humanoid3d_run_left07"),
     "lmd": ("Player1/P1_S21_dribble_long", "Player1/P1_S27_dribble_straight", "Player1/P1_S01_penalty_kick"),
     "sprinter": ("run0350cms", "run0900cms"),
@@ -118,10 +114,8 @@ def _turned(angle: float) -> np.ndarray:
     return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-FAIR = {
-    "straight": straight(), "circle 8 m": circle(8.0), "circle 3 m": circle(3.0, 2.0), "circle 2 m": circle(2.0, 3.0),
-    "winding": winding(), "walkabout": walkabout(),
-}  # fmt: skip
+FAIR = {"straight": straight(), "circle 8 m": circle(8.0), "circle 3 m": circle(3.0, 2.0),
+        "circle 2 m": circle(2.0, 3.0), "winding": winding(), "walkabout": walkabout()}
 TIGHT = {"eight": eight(), "zigzag": zigzag(), "circle 1 m": circle(1.0, 5.0)}
 HILLS = {f"hill {degrees}": hill(degrees) for degrees in (5, 10, 15)}
 ALL = {**FAIR, **TIGHT, **HILLS}
@@ -295,8 +289,6 @@ def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
 def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
     """The lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = rides(kinds, paths)
-    return [
-        kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
-        "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
-        *cycled(kinds),
-    ]  # fmt: skip
+    return [kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
+            "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
+            *cycled(kinds)]

@@ -24,10 +24,8 @@ from beyond_mocap.throws.throw import Order, shipped_model, throw_at
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of made people whom no shipped weights saw, and movements of each."""
-TARGETS = {
-    "throw": ((6.0, 0.0, 1.2), (12.0, 4.0, 0.4), (12.0, -4.0, 2.2), (18.0, 0.0, 1.0), (24.0, 6.0, 1.5)),
-    "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8)),
-}
+TARGETS = {"throw": ((6.0, 0.0, 1.2), (12.0, 4.0, 0.4), (12.0, -4.0, 2.2), (18.0, 0.0, 1.0), (24.0, 6.0, 1.5)),
+           "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8))}
 """m, the thrower or the ball at the origin; (x, y) is turned by any angle."""
 FRAMES = 90
 SIZES = (("hierarchy", 4, 3, 96), ("hierarchy", 4, 3, 128), ("hierarchy", 4, 3, 256), ("hierarchy", 1, 8, 256),
@@ -65,10 +63,9 @@ def unseen(action: str, fps: float) -> tuple:
 
 def unseen_table(model, action: str) -> list[str]:
     """What the model makes of movements that it never saw, scaled by height."""
-    lines = effort.format_head([
-        f"{len(UNSEEN)} unseen people, {EACH} each", "left hand, right hand, left foot, right foot, cm",
-        "networks alone, cm", "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits",
-    ])  # fmt: skip
+    lines = effort.format_head([f"{len(UNSEEN)} unseen people, {EACH} each",
+                                "left hand, right hand, left foot, right foot, cm", "networks alone, cm",
+                                "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits"])
     for words, options in (("networks alone (target 3 cm)", RAW), ("corrected", FULL)):
         report = evaluate_throws(model, unseen(action, model.settings.fps), options).report()
         lines.append(effort.format_row([
@@ -94,11 +91,10 @@ def target_table(model, action: str) -> list[str]:
         except BeyondMocapError as error:
             lines.append(effort.format_row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
             continue
-        lines.append(effort.format_row([
-            _place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
-            f"{np.degrees(thrown.turned):.1f}", f"{thrown.speed:.1f}", f"{100 * thrown.raw_deviation:.1f}",
-            f"{took:.2f} for {thrown.motion.duration:.1f}",
-        ]))  # fmt: skip
+        lines.append(effort.format_row([_place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
+                                        f"{np.degrees(thrown.turned):.1f}", f"{thrown.speed:.1f}",
+                                        f"{100 * thrown.raw_deviation:.1f}",
+                                        f"{took:.2f} for {thrown.motion.duration:.1f}"]))
     return lines
 
 
@@ -159,10 +155,8 @@ def throw_rows(model: ThrowModel, name: str) -> list[str]:
 
 def speed_tables() -> list[str]:
     """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
-    lines = effort.format_head((
-        "networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
-        f"s for {FRAMES} frames (target 0.12)",
-    ))  # fmt: skip
+    lines = effort.format_head(("networks", "control points", "hidden layers", "units", "parameters, million",
+                                "MB as float16", f"s for {FRAMES} frames (target 0.12)"))
     lines += [networks_row(*size) for size in SIZES]
     lines += ["", *effort.format_head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
     return lines + throw_rows(shipped_model("throw"), "throw.npz")

@@ -65,10 +65,8 @@ def pack(folder, out):
     import bpy  # noqa: F401  (brings bl_pkg)
     from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
 
-    for verb in (
-        ["validate", str(folder)],
-        ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"],
-    ):
+    for verb in (["validate", str(folder)],
+                 ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"]):
         if extension_tool(verb) != 0:
             sys.exit(f"Blender's own tool refused: {verb[0]} {folder}")
 
@@ -96,10 +94,8 @@ def complete_manifest(text, packages, platform, wheels):
     ]
     own = next(line for line in text.splitlines() if line.startswith("copyright = "))
     ours = own.removeprefix("copyright = [").removesuffix("]")
-    added = [
-        f"copyright = {_list([ours, *map(_quoted, holders)])}", f"platforms = {_list([_quoted(platform)])}",
-        f"wheels = {_list(_quoted(f'./wheels/{name}') for name in wheels)}",
-    ]
+    added = [f"copyright = {_list([ours, *map(_quoted, holders)])}", f"platforms = {_list([_quoted(platform)])}",
+             f"wheels = {_list(_quoted(f'./wheels/{name}') for name in wheels)}"]
     return text.replace(own, "\n".join(added))
 
 

@@ -57,11 +57,9 @@ class Aimed:
     possible: np.ndarray
 
 
-def aim(
-    start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-    spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None, ground: float = 0.0,
-    loft: float | None = None, about: np.ndarray | None = None,
-) -> Aimed:
+def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+        spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None,
+        ground: float = 0.0, loft: float | None = None, about: np.ndarray | None = None) -> Aimed:
     """Launches from `start` (B, 3) m so that after exactly `bounces` bounces the ball's centre is at `target` (B, 3) m.
 
     seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves
@@ -90,10 +88,8 @@ def aim(
     return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def along_ground(
-    start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, arrives: float = 2.0,
-    fastest: float | None = None, ground: float = 0.0,
-) -> Aimed:
+def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
+                 arrives: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> Aimed:
     """Level launches from `start` (B, 3) m for balls that slide and roll to where `target` (B, 3) m lies on the ground.
 
     seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
@@ -116,9 +112,8 @@ def along_ground(
     return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def out_of_reach(
-    start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float, what: str
-) -> InputError:
+def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float,
+                 what: str) -> InputError:
     """The error that says why aim `index` cannot be: how far it is, how fast the ball would have to leave, and what a
     human gives. what: who or which pass is meant."""
     start, target = np.atleast_2d(start), np.atleast_2d(target)

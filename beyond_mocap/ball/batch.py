@@ -40,9 +40,8 @@ class Balls:
         return Balls(*(value[which] for value in vars(self).values()))
 
 
-def launched(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0
-) -> Balls:
+def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+             ground: float = 0.0) -> Balls:
     """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is
     set onto the ground, and meets it at once where its way leads down."""
     spin = np.zeros(3) if spin is None else spin
@@ -57,9 +56,8 @@ def launched(
 
 
 @np.errstate(over="ignore", invalid="ignore")  # launches that are tried may be faster than numbers go
-def after(
-    balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0, most_bounces: int | None = None
-) -> Balls:
+def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
+          most_bounces: int | None = None) -> Balls:
     """The balls `seconds` (B,) or one number later. most_bounces: then they fly on through the ground (what a solver
     wants, whose targets must move smoothly with the launch)."""
     balls = Balls(*(value.copy() for value in vars(balls).values()))
@@ -75,10 +73,8 @@ def after(
     return balls
 
 
-def states(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray,
-    ground: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+           seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
     alike).
 
@@ -88,10 +84,8 @@ def states(
     return balls.position, balls.velocity
 
 
-def courses(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
-    ground: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
+            ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (B, T, 3) of balls at `times` (T,) s after their launch, ascending and not negative."""
     balls = launched(position, velocity, spin, ball, ground)
     places, velocities = [], []

@@ -258,7 +258,7 @@ def _one_after_another(turns: np.ndarray) -> np.ndarray:
     return out
 
 
-def crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
+def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
     """(3,) m: the ball's centre where it first meets the upright plane through `target` (3,) m that is square to the
     line from its launch, or the ground before that; NaN where it does neither by the flight's end."""
     start = np.asarray(flight.launch.position, float)
@@ -280,10 +280,8 @@ def crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
     return flight.at([high])[0]
 
 
-def meets_wall(
-    position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
-    spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
-) -> tuple[np.ndarray, float]:
+def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
+               spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
     """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground
     where that comes first, and where it is after 6 s or four times what it would take without air where neither does.
 

@@ -138,9 +138,8 @@ def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     return out
 
 
-def sliding(
-    velocity: np.ndarray, spin: np.ndarray, ball: Ball, ahead: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
+            ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground.
 
     ahead (..., 3): where the lowest point went at first; the push stays against it when the slip has turned about, so

@@ -84,11 +84,9 @@ class Shot:
         return float(self.aimed.seconds[self.chosen])
 
 
-def shoot(
-    strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-    turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf, near: Aimed | None = None,
-    what: str = "aim",
-) -> Shot:
+def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+          turns: tuple[float, float] = (0.0, 0.0), ground: bool = False, fastest: float = np.inf,
+          near: Aimed | None = None, what: str = "aim") -> Shot:
     """The strike that sends a ball to `target` (3,) m.
 
     seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left,
@@ -163,9 +161,8 @@ def arcs(start: np.ndarray, target: np.ndarray, ball: Ball, spin: np.ndarray | N
     return Arcs(length(found.velocity[flat]), found.velocity[flat], seconds[flat])
 
 
-def is_out_of_reach(
-    start: np.ndarray, target: np.ndarray, ball: Ball, speed: float, spin: np.ndarray | None = None
-) -> bool:
+def is_out_of_reach(start: np.ndarray, target: np.ndarray, ball: Ball, speed: float,
+                    spin: np.ndarray | None = None) -> bool:
     """Whether no launch from `start` (3,) m of at most `speed` m/s comes as far as `target` (3,) m: a fan of flights,
     far quicker than looking for the launch, and never wrong about a target that can be reached."""
     way = np.asarray(target, float) - start
@@ -175,9 +172,8 @@ def is_out_of_reach(
     velocity = _SLACK * speed * (np.cos(rise)[:, None] * ahead + np.sin(rise)[:, None] * [0.0, 0.0, 1.0])
     count = np.zeros(len(rise), int)
     spin = np.zeros(3) if spin is None else np.asarray(spin, float)
-    balls = batch.Balls(
-        np.tile(np.asarray(start, float), (len(rise), 1)), velocity, np.tile(spin, (len(rise), 1)), count, count
-    )
+    balls = batch.Balls(np.tile(np.asarray(start, float), (len(rise), 1)), velocity, np.tile(spin, (len(rise), 1)),
+                        count, count)
     longest = 2.0 * speed / ball.gravity + 1.0
     for _ in range(int(np.ceil(longest / batch.STEP))):
         before = balls.position

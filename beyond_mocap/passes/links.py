@@ -59,24 +59,22 @@ def _bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     places, _ = pose_kinematics(motion.skeleton, root, local)
     body = identify(motion.skeleton)
     chest = body.chest
-    joints = [
-        body.hips, chest if body.head is None else body.head,
-        *(chest if limb.hand is None else limb.hand for limb in (body.left, body.right)),
-        body.left.toe_or_foot, body.right.toe_or_foot,
-    ]
+    joints = [body.hips, chest if body.head is None else body.head,
+              *(chest if limb.hand is None else limb.hand for limb in (body.left, body.right)), body.left.toe_or_foot,
+              body.right.toe_or_foot]
     return places[:, joints], heading_from_positions(motion.skeleton, places)
 
 
-def alike(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
+def weigh_bones(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
     """(N, 12, 3) float32 of the library's N frames: the sum of the distances of two frames' rows is eq. 1, over the sum
     of the usual weights of positions, so that it is about the distance in m of one bone. Kept beside the library's
     cache."""
     scale = sum(BoneWeights().position)
     measure = np.array([*weights.position, *weights.velocity]) / scale
-    return bones(library) * measure.astype(np.float32)[:, None]
+    return measure_bones(library) * measure.astype(np.float32)[:, None]
 
 
-def bones(library: Library) -> np.ndarray:
+def measure_bones(library: Library) -> np.ndarray:
     """(N, 12, 3) float32: positions m, then velocities m/s, of `links.BONES` at every frame of the library."""
     if library not in _known:
         arrays = kept.load(library, "bones")

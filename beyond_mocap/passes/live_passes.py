@@ -78,9 +78,8 @@ class Rally:
         for name, motion in piece.motions.items():
             players[name] = _going_on(self.players[name], motion, at)
         ball = _on_from(self.ball, piece.ball, at)
-        return replace(
-            self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds, passes=self.passes + 1
-        )
+        return replace(self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds,
+                       passes=self.passes + 1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -118,10 +117,8 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
     return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
 
 
-def answer(
-    library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
-    progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
-) -> Piece:
+def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
+           progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> Piece:
     """The pass with which the holder answers a hit of the user: the library's most alike motion (eq. 2), to `target`.
 
     now: s, when all stand. InputError for a target that is nobody or the holder himself, or out of reach; NotInLibrary
@@ -129,9 +126,8 @@ def answer(
     """
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
-    one = Pass(
-        rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side, example=Example("", hit=hit)
-    )
+    one = Pass(rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side,
+               example=Example("", hit=hit))
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
         players=tuple(
@@ -230,7 +226,5 @@ def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:
         return BallPath(times, places, np.ones(len(times), bool), turns)
     kept = before.times < at - 0.5 * step
     turns = quaternion.multiply(turns, before.rotations[kept][-1] if kept.any() else quaternion.identity(1)[0])
-    return BallPath(
-        np.concatenate([before.times[kept], times]), np.concatenate([before.positions[kept], places]),
-        np.ones(int(kept.sum()) + len(times), bool), np.concatenate([before.rotations[kept], turns]),
-    )
+    return BallPath(np.concatenate([before.times[kept], times]), np.concatenate([before.positions[kept], places]),
+                    np.ones(int(kept.sum()) + len(times), bool), np.concatenate([before.rotations[kept], turns]))

@@ -168,9 +168,8 @@ class Court:
         net = self.scene.net
         return np.ones(len(ways), bool) if net is None else clears_net(ways, self.ball.radius, net)
 
-    def flown(
-        self, number: int, start: np.ndarray, target: np.ndarray, seconds: np.ndarray
-    ) -> tuple[Aimed, np.ndarray]:
+    def flown(self, number: int, start: np.ndarray, target: np.ndarray,
+              seconds: np.ndarray) -> tuple[Aimed, np.ndarray]:
         """The launches (S) of a pass from `start` (S, 3) m to `target` (3,) m that take `seconds` (S,), and whether
         each is what a human can give and clear of the net."""
         spin = spun(start, target, seconds, self.ball, self.sites[number].kind)
@@ -254,9 +253,8 @@ def spun(starts: np.ndarray, target: np.ndarray, seconds: np.ndarray, ball: Ball
     return SPINS[kind] * rolling_spin((target - starts) / np.asarray(seconds)[:, None], ball)
 
 
-def ways_of(
-    starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray, ball: Ball
-) -> np.ndarray:
+def ways_of(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
+            ball: Ball) -> np.ndarray:
     """(N, _STEPS + 1, 3) m: flights of N balls, each at even steps of its own `seconds` (N,)."""
     balls = launched(starts, velocities, spin, ball)
     out = [balls.position]
@@ -286,9 +284,8 @@ def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float
     return OWN_BODY * np.where(inside, np.clip((TRUNK - near) / TRUNK, 0.0, 1.0), 0.0).max(axis=1)
 
 
-def arrivals(
-    starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray, ball: Ball
-) -> np.ndarray:
+def arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None, seconds: np.ndarray,
+             ball: Ball) -> np.ndarray:
     """(N, 3) m/s: velocities with which balls come in after `seconds` (N,); one that is met on the ground has not
     bounced."""
     return after(launched(starts, velocities, spin, ball), ball, seconds - A_MOMENT).velocity

@@ -55,9 +55,8 @@ def first_time(court: Court, order: HitOrder, need: Need) -> float:
     return float(np.ceil(least * fps - 1e-6) / fps)
 
 
-def in_time(
-    court: Court, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray, first: float, need: Need
-) -> tuple[list[Link], list[str]]:
+def in_time(court: Court, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray, first: float,
+            need: Need) -> tuple[list[Link], list[str]]:
     """The chain with flights long enough for who strikes next, and a line for everybody who still has too little
     time."""
     told: list[str] = []
@@ -143,10 +142,9 @@ class PassPlan:
         return np.maximum(np.searchsorted(starts, np.asarray(times, float) + 1e-9, side="right") - 1, 0)
 
 
-def plan_passes(
-    scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need, cancelled: Callable[[], bool] | None = None,
-    progress: Callable[[float, str], None] | None = None,
-) -> PassPlan:
+def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
+                cancelled: Callable[[], bool] | None = None,
+                progress: Callable[[float, str], None] | None = None) -> PassPlan:
     """The chain of strikes and flights of a scene.
 
     sites: of every strike, the last one where the last pass ends. need: seconds that a player needs from one strike, or
@@ -171,12 +169,10 @@ def plan_passes(
 def _order(court: Court, chain: Sequence[Link], number: int, time: float, places, normals) -> HitOrder:
     link, site = chain[number], court.sites[number]
     one = link.moment.hits[int(link.moment.which[0])]
-    return HitOrder(
-        time=time, clip=one.clip, hit=one.hit, strike_frame=float(link.moment.frame[0]),
-        place=tuple(map(float, site.place)), facing=link.facing, ball=tuple(map(float, places[number])),
-        normal=tuple(map(float, normals[number])), part=site.part, side=one.hit.side, tool=site.tool, kind=site.kind,
-        touches=number < court.last or court.passes[-1].error != "missed",
-    )  # fmt: skip
+    return HitOrder(time=time, clip=one.clip, hit=one.hit, strike_frame=float(link.moment.frame[0]),
+                    place=tuple(map(float, site.place)), facing=link.facing, ball=tuple(map(float, places[number])),
+                    normal=tuple(map(float, normals[number])), part=site.part, side=one.hit.side, tool=site.tool,
+                    kind=site.kind, touches=number < court.last or court.passes[-1].error != "missed")
 
 
 def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) -> tuple[Strike, ...]:

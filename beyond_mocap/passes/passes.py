@@ -79,10 +79,8 @@ class Passes:
         return float(next(player for player in self.players if player.name == one.player).gaps[own])
 
 
-def passes(
-    library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Passes:
+def passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+           cancelled: Callable[[], bool] | None = None) -> Passes:
     """The scene played with the motions of a library. The same scene and library give the same bits.
 
     InputError for a part that the skeleton lacks, and for passes that no human can give; NotInLibrary where nothing in
@@ -125,10 +123,8 @@ def _part_of(report, number: int, players: tuple[Player, ...]):
     return told
 
 
-def planned(
-    library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> PassPlan:
+def planned(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+            cancelled: Callable[[], bool] | None = None) -> PassPlan:
     """Strikes and flights of a scene alone, for live editing. Errors as for `passes`."""
     scene = _with_chance(scene)
     ball = ball_of(scene)
@@ -293,9 +289,8 @@ def _needs(library: Library, sizes: dict[str, float]):
 # -- the bodies
 
 
-def _played(
-    library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress, cancelled
-) -> PlayerMotion:
+def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
+            cancelled) -> PlayerMotion:
     """One player's motion in his own size; the work is done in the library's."""
     size = size_of(player, library)
     orders = [_sized(order, size) for order in plan.orders(player.name)]

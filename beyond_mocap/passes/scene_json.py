@@ -1,4 +1,4 @@
-"""The files of a passing scene (docs/passes/passes.md): SCENE.json, samples to begin with, and the strikes as a table."""
+"""The files of a passing scene (docs/passes/passes.md): SCENE.json, samples of it, and the strikes as a table."""
 
 from __future__ import annotations
 
@@ -25,49 +25,35 @@ _OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "erro
 
 SAMPLES: dict[str, dict] = {
     "three": {
-        "players": [
-            {"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
-            {"name": "Cho", "place": [2.8, -1.6]},
-        ],
-        "passes": [
-            {"from": "Ann", "to": "Ben", "kind": "pass"}, {"from": "Ben", "to": "Cho", "kind": "toss"},
-            {"from": "Cho", "to": "Ann", "kind": "attack"},
-        ],
+        "players": [{"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
+                    {"name": "Cho", "place": [2.8, -1.6]}],
+        "passes": [{"from": "Ann", "to": "Ben", "kind": "pass"}, {"from": "Ben", "to": "Cho", "kind": "toss"},
+                   {"from": "Cho", "to": "Ann", "kind": "attack"}],
         "repeat": 3,
         "seed": 3,
     },
     "six": {
-        "players": [
-            {"name": "Ann", "place": [4.2, 0.0]}, {"name": "Ben", "place": [2.1, 3.7]},
-            {"name": "Cho", "place": [-2.1, 3.7]}, {"name": "Dia", "place": [-4.2, 0.0]},
-            {"name": "Eli", "place": [-2.1, -3.7]}, {"name": "Fay", "place": [2.1, -3.7]},
-        ],
-        "passes": [
-            {"from": "Ann", "to": "Cho", "kind": "pass"}, {"from": "Cho", "to": "Dia", "kind": "toss"},
-            {"from": "Dia", "to": "Fay", "kind": "attack"}, {"from": "Fay", "to": "Ben", "kind": "pass"},
-            {"from": "Ben", "to": "Eli", "kind": "pass"}, {"from": "Eli", "to": "Ann", "kind": "pass"},
-        ],
+        "players": [{"name": "Ann", "place": [4.2, 0.0]}, {"name": "Ben", "place": [2.1, 3.7]},
+                    {"name": "Cho", "place": [-2.1, 3.7]}, {"name": "Dia", "place": [-4.2, 0.0]},
+                    {"name": "Eli", "place": [-2.1, -3.7]}, {"name": "Fay", "place": [2.1, -3.7]}],
+        "passes": [{"from": "Ann", "to": "Cho", "kind": "pass"}, {"from": "Cho", "to": "Dia", "kind": "toss"},
+                   {"from": "Dia", "to": "Fay", "kind": "attack"}, {"from": "Fay", "to": "Ben", "kind": "pass"},
+                   {"from": "Ben", "to": "Eli", "kind": "pass"}, {"from": "Eli", "to": "Ann", "kind": "pass"}],
         "repeat": 2,
     },
     "volley_net": {
-        "players": [
-            {"name": "Ann", "place": [-2.2, 1.6]}, {"name": "Ben", "place": [-4.0, -1.6], "part": "head"},
-            {"name": "Cho", "place": [2.4, -1.4]}, {"name": "Dia", "place": [4.2, 1.8]},
-        ],
-        "passes": [
-            {"from": "Ann", "to": "Ben", "kind": "toss"}, {"from": "Ben", "to": "Cho", "kind": "pass"},
-            {"from": "Cho", "to": "Dia", "kind": "toss"}, {"from": "Dia", "to": "Ann", "kind": "attack"},
-        ],
+        "players": [{"name": "Ann", "place": [-2.2, 1.6]}, {"name": "Ben", "place": [-4.0, -1.6], "part": "head"},
+                    {"name": "Cho", "place": [2.4, -1.4]}, {"name": "Dia", "place": [4.2, 1.8]}],
+        "passes": [{"from": "Ann", "to": "Ben", "kind": "toss"}, {"from": "Ben", "to": "Cho", "kind": "pass"},
+                   {"from": "Cho", "to": "Dia", "kind": "toss"}, {"from": "Dia", "to": "Ann", "kind": "attack"}],
         "defaults": {"bounces": 0},
         "repeat": 2,
         "ball": "volleyball",
         "net": {"from": [0.0, -4.5], "to": [0.0, 4.5], "height": 1.5},
     },
     "racquet": {
-        "players": [
-            {"name": "Ann", "place": [-6.5, 0.6], "part": "tool", "side": "right"},
-            {"name": "Ben", "place": [6.5, -0.6], "part": "tool", "side": "right"},
-        ],
+        "players": [{"name": "Ann", "place": [-6.5, 0.6], "part": "tool", "side": "right"},
+                    {"name": "Ben", "place": [6.5, -0.6], "part": "tool", "side": "right"}],
         "passes": [{"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Ann"}],
         "repeat": 3,
         "ball": "tennis",
@@ -75,22 +61,16 @@ SAMPLES: dict[str, dict] = {
         "serve": "Ben",
     },
     "dropped": {
-        "players": [
-            {"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
-            {"name": "Cho", "place": [2.8, -1.6]},
-        ],
-        "passes": [
-            {"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Cho"}, {"from": "Cho", "to": "Ann"},
-            {"from": "Ann", "to": "Ben", "error": "dropped"},
-        ],
+        "players": [{"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
+                    {"name": "Cho", "place": [2.8, -1.6]}],
+        "passes": [{"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Cho"}, {"from": "Cho", "to": "Ann"},
+                   {"from": "Ann", "to": "Ben", "error": "dropped"}],
         "lead_out": 2.5,
     },
 }
 
-COLUMNS = (
-    "time_s", "frame", "player", "kind", "part", "side", "clip", "clip_frame", "mirrored", "x_m", "y_m", "z_m",
-    "speed_in_m_s", "speed_out_m_s", "travel_s", "bounces", "facing_deg", "contact_gap_m", "outcome",
-)  # fmt: skip
+COLUMNS = ("time_s", "frame", "player", "kind", "part", "side", "clip", "clip_frame", "mirrored", "x_m", "y_m", "z_m",
+           "speed_in_m_s", "speed_out_m_s", "travel_s", "bounces", "facing_deg", "contact_gap_m", "outcome")
 
 
 def read_scene(path: str | os.PathLike) -> PassScene:
@@ -163,11 +143,10 @@ def _pass_out(one: Pass) -> dict:
 
 
 def _scene(whole) -> PassScene:
-    read: dict[str, Callable] = {
-        "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
-        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number,
-        "directions": whole_number, "watch": truth, "weights": _weights,
-    }  # fmt: skip
+    read: dict[str, Callable] = {"players": _list_of(_player), "repeat": whole_number, "fps": number,
+                                 "seed": whole_number, "ball": _ball, "net": _net, "serve": _serve,
+                                 "transition": number, "lead_in": number, "lead_out": number,
+                                 "directions": whole_number, "watch": truth, "weights": _weights}
     known = {*read, "passes", "defaults", "errors"}
     check_names(whole, "the scene", known, ("players", "passes"))
     found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
@@ -177,9 +156,8 @@ def _scene(whole) -> PassScene:
 
 
 def _player(value, where: str) -> Player:
-    read: dict[str, Callable] = {
-        "name": text, "place": _place, "facing": _angle, "part": text, "side": text, "tool": _tool, "height": number,
-    }  # fmt: skip
+    read: dict[str, Callable] = {"name": text, "place": _place, "facing": _angle, "part": text, "side": text,
+                                 "tool": _tool, "height": number}
     check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
@@ -193,10 +171,8 @@ def _pass(value, where: str, usual: Mapping) -> Pass:
 
 def _settings(value, where: str) -> dict:
     """What a pass may say beside its players."""
-    read = {
-        "kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
-        "example": _example, "error": text,
-    }  # fmt: skip
+    read = {"kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
+            "example": _example, "error": text}
     check_names(value, where, read, ())
     return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
 

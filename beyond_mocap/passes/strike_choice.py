@@ -129,11 +129,9 @@ class StrikeMoments:
     def only(self, which: Sequence[int] | np.ndarray) -> StrikeMoments:
         """Those of a mask or of indices (M,)."""
         struck = self.struck
-        return replace(
-            self, which=self.which[which], frame=self.frame[which], lead=self.lead[which], trail=self.trail[which],
-            travel=self.travel[which],
-            struck=StruckFrom(struck.start[which], struck.end[which], struck.radius, struck.velocity[which]),
-        )
+        return replace(self, which=self.which[which], frame=self.frame[which], lead=self.lead[which],
+                       trail=self.trail[which], travel=self.travel[which],
+                       struck=StruckFrom(struck.start[which], struck.end[which], struck.radius, struck.velocity[which]))
 
     def ball(self, normal: np.ndarray, radius: float) -> np.ndarray:
         """(N, 3) m, own frame: the centre of a ball that lies on the part toward `normal` (N, 3), own frame."""
@@ -150,9 +148,8 @@ class StrikeMoments:
         return unit_vectors(out)
 
 
-def strike_moments(
-    library: Library, hits: Sequence[LibraryHit], tool: Tool | None = None, size: float = 1.0
-) -> StrikeMoments:
+def strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | None = None,
+                   size: float = 1.0) -> StrikeMoments:
     """The moments of these hit motions, in their order."""
     which, frames, struck, lead, trail, travel = [], [], [], [], [], []
     for number, one in enumerate(hits):

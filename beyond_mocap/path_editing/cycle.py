@@ -151,8 +151,8 @@ def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:
 
 def _as_long_as_faded(residuals: Residuals, loop: Loop) -> Loop:
     reach = _reach(residuals, (loop,))
-    own = residuals.step[np.clip(window(loop, reach), 1, len(residuals) - 1)]
-    return replace(loop, metres=loop.metres + float(faded_steps(residuals, loop, reach).sum() - own.sum()))
+    own = residuals.step[np.clip(jump_window(loop, reach), 1, len(residuals) - 1)]
+    return replace(loop, metres=loop.metres + float(fade_steps(residuals, loop, reach).sum() - own.sum()))
 
 
 def _exact_end(loops: tuple[Loop, ...], own: float, length: float, most: float) -> tuple[Loop, ...]:
@@ -217,14 +217,14 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     ends = [loop.end for loop in jumps] + [count]
     taken = np.concatenate([np.arange(a, b) for a, b in zip(begins, ends)])
     seams = np.cumsum([b - a for a, b in zip(begins, ends)])[:-1]
-    parts = {name: [values] for name, values in rows(residuals).items()}
+    parts = {name: [values] for name, values in list_rows(residuals).items()}
     for loop in kinds:
-        for name, values in faded(residuals, loop, reach).items():
+        for name, values in fade_jump(residuals, loop, reach).items():
             parts[name].append(values)
     kind = np.array([kinds.index(loop) for loop in jumps])
     around = np.arange(-reach, reach)
     taken[seams[:, None] + around] = count + kind[:, None] * 2 * reach + around + reach
-    source = np.concatenate([np.arange(count), *(window(loop, reach) for loop in kinds)])
+    source = np.concatenate([np.arange(count), *(jump_window(loop, reach) for loop in kinds)])
     values = {name: np.concatenate(each)[taken] for name, each in parts.items()}
     values["frames"] = residuals.frames[source[taken]]
     return residuals.changed(**values), seams
@@ -237,23 +237,23 @@ def _reach(residuals: Residuals, jumps: tuple[Loop, ...]) -> int:
     return max(min(int(round(FADE_SECONDS * residuals.fps)), min(pieces) // 2), 1)
 
 
-def rows(residuals: Residuals) -> dict[str, np.ndarray]:
+def list_rows(residuals: Residuals) -> dict[str, np.ndarray]:
     """Every array of a motion that can be mixed: all but the numbers of its frames."""
     return {name: values for name, values in residuals.arrays.items() if name != "frames"}
 
 
-def window(loop: Loop, reach: int) -> np.ndarray:
+def jump_window(loop: Loop, reach: int) -> np.ndarray:
     """The frames (2 * reach,) that are shown around a jump where nothing is faded."""
     around = np.arange(-reach, reach)
     return np.where(around < 0, loop.end, loop.start) + around
 
 
-def faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]:
-    """All `rows` of the 2 * reach frames around a jump, faded from the frames around the loop's end to those around its
-    start."""
+def fade_jump(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]:
+    """All `list_rows` of the 2 * reach frames around a jump, faded from the frames around the loop's end to those
+    around its start."""
     both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
     after, come = both.around >= 0, both.come
-    shown = rows(residuals)
+    shown = list_rows(residuals)
     shown["turn"] = _since_before(shown["turn"])
     rotations, standing = shown.pop("rotations"), shown.pop("standing")
     out = {name: _mixed(*both.values(values), come) for name, values in shown.items()}
@@ -261,11 +261,11 @@ def faded(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]
     own, other = (np.where(after[:, None, None], *pair) for pair in ((beginning, ending), (ending, beginning)))
     out["rotations"] = faded_rotations(own, np.arange(2 * reach), other, both.through, after)
     out["standing"] = _standing(*both.labels(standing), come)
-    out["step"] = faded_steps(residuals, loop, reach)
+    out["step"] = fade_steps(residuals, loop, reach)
     return out
 
 
-def faded_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
+def fade_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
     """(2 * reach,) metres since the frame before, such that the body's speed along the path is the mean of both
     stretches' speeds although its place in the frame goes over from the one's to the other's."""
     both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
@@ -334,10 +334,8 @@ class _Stretches:
         over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
         whole, slope = last - first >= over, ending.mean(axis=0) - beginning.mean(axis=0)
         out, longest = apart.copy(), _FURTHER * self.fps
-        for edge, inner, beyond in (
-            (first, min(first + over, last), np.arange(first)),
-            (last, max(last - over, first), np.arange(last + 1, len(apart))),
-        ):
+        for edge, inner, beyond in ((first, min(first + over, last), np.arange(first)),
+                                    (last, max(last - over, first), np.arange(last + 1, len(apart)))):
             near = (apart[edge] - apart[inner]) / (edge - inner) if whole else slope
             far = np.sign(beyond - edge) * longest * (1.0 - np.exp(-np.abs(beyond - edge) / longest))
             out[beyond] = apart[edge] + far.reshape(-1, *[1] * (apart.ndim - 1)) * near

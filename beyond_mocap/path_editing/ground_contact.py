@@ -197,10 +197,8 @@ def _planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surf
     return np.where(edge, np.maximum(at_toe, at_heel), at_toe), slope
 
 
-def _clearing(
-    feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray, which: np.ndarray,
-    surface: Surface,
-) -> np.ndarray:
+def _clearing(feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray,
+              which: np.ndarray, surface: Surface) -> np.ndarray:
     """(T,) metres by which a foot in the air goes higher so that neither end of it is in the ground: a bump a swing."""
     lift = np.zeros(len(feet))
     aloft = np.flatnonzero((way > 0.0) & (way < 1.0))
@@ -218,14 +216,14 @@ def _clearing(
     return lift
 
 
-def tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
+def find_tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
     """(T,) bool: frames within a tight stretch. at (T,): the path's parameters, arc (T,) m passed until then, own (T,)
     1/m: how much the motion's own path bends there: what it could do it still can."""
     bend = curvature(path, at)
     return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc, fps)
 
 
-def steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
+def find_steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
     """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the
     motion's own path."""
     slope = arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
@@ -238,20 +236,18 @@ def curvature(path: Path, at: np.ndarray) -> np.ndarray:
     return np.abs(cross_level(first, second)) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
 
 
-def share(free: np.ndarray, fps: float) -> np.ndarray:
+def share_free(free: np.ndarray, fps: float) -> np.ndarray:
     """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
     wide = int(round(_FADE * fps))
     inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
     return hann_smooth(inner, wide)
 
 
-def told(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
+def strain_lines(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
     """One line for each kind of stretch, with its seconds; tight and steep (T,) bool."""
     lines = []
-    for which, what in (
-        (tight, f"the path bends more tightly than {TIGHT:g} m radius"),
-        (steep, f"the path is steeper than {STEEP:g} degrees"),
-    ):
+    for which, what in ((tight, f"the path bends more tightly than {TIGHT:g} m radius"),
+                        (steep, f"the path is steeper than {STEEP:g} degrees")):
         spans = [(first / fps, (end - 1) / fps) for first, end in runs(which)]
         if spans:
             more = f" and {len(spans) - 1} times more" if len(spans) > 1 else ""

@@ -128,9 +128,8 @@ def placed(frame: str, moving: MovingFrame, place: np.ndarray, rotations: np.nda
     return moving.origin + quaternion.rotate(off, place), out
 
 
-def moving_frame(
-    origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float, otherwise: float | None = None
-) -> MovingFrame:
+def moving_frame(origin: np.ndarray, tangent: np.ndarray, arc: np.ndarray, fps: float,
+                 otherwise: float | None = None) -> MovingFrame:
     """The frame at places `origin` (T, 3) m of a path with tangents (T, 3) of any length, passed at lengths `arc` (T,)
     m.
 
@@ -139,9 +138,8 @@ def moving_frame(
     along = tangent / np.maximum(length, 1e-12)[:, None]
     pace = np.abs(np.gradient(arc)) * fps if len(arc) > 1 else np.zeros(1)
     level = np.linalg.norm(along[:, :2], axis=1)
-    return MovingFrame(
-        origin, heading(along, pace * level, fps, otherwise), arctan2(along[:, 2], np.maximum(level, 1e-12))
-    )
+    return MovingFrame(origin, heading(along, pace * level, fps, otherwise),
+                       arctan2(along[:, 2], np.maximum(level, 1e-12)))
 
 
 def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float | None = None) -> np.ndarray:
@@ -173,7 +171,7 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     return goal[0] + squares.solve()[:, 0]
 
 
-def fit(motion: Motion, standing: np.ndarray, kind: str = "spline", degree: int = 13) -> Path:
+def fit_path(motion: Motion, standing: np.ndarray, kind: str = "spline", degree: int = 13) -> Path:
     """The path of a motion, on the ground; its parameter is seconds from the first frame.
 
     standing: (T, 2, 2) bool, `contacts.points` of the motion. kind: one of KINDS. degree: of the polynomial. InputError

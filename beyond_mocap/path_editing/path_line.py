@@ -49,9 +49,8 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     sampled = _with_hairpins(sampled, along, rounding, closed)
     pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
     if closed:
-        spline = smoothing_spline(
-            sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True, domain=(0.0, along[-1])
-        )
+        spline = smoothing_spline(sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True,
+                                  domain=(0.0, along[-1]))
     else:
         weights = np.ones(len(along))
         spline = smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, ends_met=True)
@@ -106,10 +105,8 @@ def straight(path: Path, count: int) -> np.ndarray:
 def _check_degree(count: int, degree: int) -> None:
     """InputError where a B-spline of `count` control points cannot have this degree."""
     if not 1 <= degree < count:
-        raise InputError(
-            "control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
-            "take more points or a lower degree",
-        )
+        raise InputError("control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
+                         "take more points or a lower degree")
 
 
 def _even_knots(count: int, degree: int) -> np.ndarray:

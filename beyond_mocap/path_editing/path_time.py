@@ -100,9 +100,8 @@ def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
-def by_way(
-    residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float, closed: bool
-) -> Timing:
+def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float,
+           closed: bool) -> Timing:
     """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
 
     The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS /
@@ -187,7 +186,7 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
     return both[:, 0] / both[:, 1]
 
 
-def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
+def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
     """The residuals at rows `at` (N,), fractional: cubics through the four rows around (Catmull and Rom 1974), since
     straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns
     are those from one output frame to the next."""
@@ -235,12 +234,12 @@ class Ending:
     (S,): output frames at which the motion begins anew; told: lines for the user."""
 
     count: int
-    shown: np.ndarray
+    take_rows: np.ndarray
     again: np.ndarray
     told: tuple[str, ...] = ()
 
 
-def ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed: bool = False) -> Ending:
+def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed: bool = False) -> Ending:
     """How a motion ends on a path `length` metres long, when it is at arc (T,) m, never falling, in its frames.
 
     end: "stop", or "repeat": motion and path begin again, as often as there are frames, without the wait that a rider

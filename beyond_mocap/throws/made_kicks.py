@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..annotation.striking import FOOT_RADIUS
-from ..ball.flight import meets_wall
+from ..ball.flight import meet_wall
 from ..ball.physics import FOOTBALL, Ball
 from ..base.arctangent import arctan2
 from ..base.errors import InputError
@@ -116,7 +116,7 @@ class _Aim:
             rate = speed / float(np.linalg.norm(velocity))
             turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
             spun = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([rate * velocity, rate * spin]))
-            met, _ = meets_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
+            met, _ = meet_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
             near = near or bool(np.linalg.norm(met - target) < _HIT)
             if exact and np.linalg.norm(met - target) < _HIT:
                 break

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline, format_timeline
-from ..ball.flight import meets_wall
+from ..ball.flight import meet_wall
 from ..ball.physics import BASEBALL
 from ..base.errors import Cancelled, InputError
 from ..files.bvh import bvh
@@ -53,7 +53,7 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
     """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
     target, speed = _throw_order(thrower.fastest, chance)
     made = subject_throws(thrower, target, speed, chance, fps)
-    impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
+    impact, _ = meet_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
     words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
     return Planted(motion=made.motion, limb=limb, release=made.release, position=made.position, velocity=made.velocity,
                    impact=impact, words=words)

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..ball.flight import Flight, Launch, crossing, fly
+from ..ball.flight import Flight, Launch, find_crossing, fly
 from ..ball.physics import BALLS, FASTEST, THROWN, Ball
 from ..ball.shot import arcs, is_out_of_reach
 from ..base.arctangent import arctan2
@@ -503,7 +503,7 @@ class _Work:
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
         launch = Launch(start + left, found.position, found.velocity, found.spin)
         flight = fly(launch, self.ball, found.seconds + _GOES_ON + found.motion.duration)
-        impact = crossing(flight, self.target)
+        impact = find_crossing(flight, self.target)
         self._tell(found, impact, beyond)
         return Thrown(
             motion=found.motion, start_time=start, release=left, limb=EFFECTORS[self.limb], ball=self.ball,

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..annotation import ClipAnnotation
 from ..annotation.labels import list_labels
-from ..ball.flight import meets_wall
+from ..ball.flight import meet_wall
 from ..ball.physics import BASEBALL, FOOTBALL, Ball
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
@@ -446,4 +446,4 @@ def _launched(motion: Motion, release: float, limb: int, known: _Known) -> tuple
 def _wall(position: np.ndarray, launch: np.ndarray, action: Action) -> np.ndarray:
     """Where the ball meets an upright wall at the usual distance, or the ground before it."""
     ahead = launch[:2] / max(float(np.hypot(*launch[:2])), 1e-9)
-    return meets_wall(position, launch, action.ball, position[:2] + action.wall * ahead, ahead)[0]
+    return meet_wall(position, launch, action.ball, position[:2] + action.wall * ahead, ahead)[0]

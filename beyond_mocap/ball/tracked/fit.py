@@ -268,9 +268,8 @@ def _cropped(stretches: Stretches) -> Stretches:
     return Stretches(**rest, **wide)
 
 
-def coarse_courses(
-    place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball, step: float, count: int
-) -> tuple[np.ndarray, np.ndarray]:
+def coarse_courses(place: np.ndarray, velocity: np.ndarray, spin: np.ndarray, ball: Ball, step: float,
+                   count: int) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (B, count + 1, 3) of balls launched with place, velocity and spin (B, 3), at every
     `step` s."""
     place, velocity, spin = place.copy(), velocity.copy(), spin.copy()

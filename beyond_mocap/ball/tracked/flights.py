@@ -26,9 +26,8 @@ _HIGH = 0.6  # m, where a foot hardly takes a ball
 _AIR = 0.35  # m of the centre above the ground, from which it flies
 
 
-def flown(
-    samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool, cancelled=None
-) -> list[BallPiece]:
+def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool,
+          cancelled=None) -> list[BallPiece]:
     """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced
     by flights where these fit. heights: whether those of the samples are meant."""
     groups = _between(pieces, moments)

@@ -27,13 +27,12 @@ class TouchKind:
 KICK, RECEIVE, DRIBBLE, HEADER, CHESTED = "kick", "receive", "dribble", "header", "chest"
 THROW_IN, HAND, SAVE, DEFLECTION = "throw-in", "hand", "save", "deflection"
 
-TOUCH_KINDS = (
-    TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
-    TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"), TouchKind(HEADER, "sends", ("header",), "pass"),
-    TouchKind(CHESTED, "takes", ("receive", "body"), "receive"),
-    TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)), TouchKind(HAND, "takes", ("catchb",), "catch"),
-    TouchKind(SAVE, "takes", ("catchb",), "save"), TouchKind(DEFLECTION, "", (), "deflection"),
-)
+TOUCH_KINDS = (TouchKind(KICK, "sends", ("kick",), "pass"), TouchKind(RECEIVE, "takes", ("receive", "foot"), "receive"),
+               TouchKind(DRIBBLE, "carries", ("dribble",), "dribble"), TouchKind(HEADER, "sends", ("header",), "pass"),
+               TouchKind(CHESTED, "takes", ("receive", "body"), "receive"),
+               TouchKind(THROW_IN, "sends", ("throwb",), "pass", ("throw-in",)),
+               TouchKind(HAND, "takes", ("catchb",), "catch"), TouchKind(SAVE, "takes", ("catchb",), "save"),
+               TouchKind(DEFLECTION, "", (), "deflection"))
 KINDS = tuple(kind.name for kind in TOUCH_KINDS)
 CHEST, HEAD = 0.95, 1.45  # m of the ball's centre from which the chest, the head meets it
 _FAST = 7.0  # m/s relative to the player, more than a dribble's touch

@@ -131,7 +131,7 @@ def _solve(times, points, weights, cuts, begin, upto) -> Fits:
                 inverse=inverse)
 
 
-def promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
+def find_promising(times: np.ndarray, points: np.ndarray, known: np.ndarray, interval: float) -> np.ndarray:
     """Growing places 0 < k < N where the velocity may change, and 0 and N. points (N, D) with gaps bridged."""
     count = len(times)
     chosen = np.zeros(count + 1, bool)
@@ -167,10 +167,10 @@ def velocity_change(points: np.ndarray, side: int, interval: float) -> np.ndarra
 def choose_cuts(times, points, weights, places, price: float = PRICE) -> np.ndarray:
     """Those of `places` that, as cuts between pieces, explain the samples best (the first and last always)."""
     pieces = fit_between(times, points, weights, places, _LONGEST)
-    return places[cheapest(pieces, places, price)]
+    return places[find_cheapest(pieces, places, price)]
 
 
-def cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
+def find_cheapest(pieces: Fits, places: np.ndarray, price: float) -> np.ndarray:
     """Indices into `places` of the cheapest way from the first to the last, each piece paying `price` beside its
     cost."""
     begin = np.searchsorted(places, pieces.first)

@@ -86,11 +86,9 @@ class SolvedBall:
         """The pieces of the path."""
         return self.ball.pieces
 
-def solve(
-    times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
-    pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> SolvedBall:
+def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
+          pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
+          cancelled: Callable[[], bool] | None = None) -> SolvedBall:
     """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
 
     teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
@@ -120,11 +118,10 @@ def solve(
     solved = _thrown_in(solved, ends, pitch[1])
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
-    return SolvedBall(
-        times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled, outlier=samples.outlier,
-        measured=frozen_array(samples.measured, bool), residuals=frozen_array(residuals),
-        ends=tuple(_by_whom(end, solved) for end in ends), confidence=sure, notes=_notes(samples, heights),
-    )  # fmt: skip
+    return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
+                      outlier=samples.outlier, measured=frozen_array(samples.measured, bool),
+                      residuals=frozen_array(residuals), ends=tuple(_by_whom(end, solved) for end in ends),
+                      confidence=sure, notes=_notes(samples, heights))
 
 
 def _windows(samples: Samples, where: str) -> list[slice]:
@@ -154,7 +151,7 @@ def _bridged(samples: Samples, window: slice) -> np.ndarray:
 def _solve_window(samples: Samples, window: slice, positions: np.ndarray, stranger: float) -> touches.Cuts:
     times, points = samples.times[window], _bridged(samples, window)
     weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _TOGETHER)
-    places = pieces.promising(times, points, samples.used[window], samples.interval)
+    places = pieces.find_promising(times, points, samples.used[window], samples.interval)
     chosen = pieces.choose_cuts(times, points, weights, places)
     cost = _reach_cost(times, points, positions[:, window], chosen, stranger)
     return touches.solve_cuts(times, points, weights, chosen, cost)
@@ -165,7 +162,7 @@ def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
     costs = []
     for near in (cuts - 1, cuts):
         index = np.clip(near, 0, len(times) - 1)
-        away = touches.distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
+        away = touches.player_distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
         costs.append(touches.reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, stranger))
     return np.minimum(*costs)
 
@@ -225,8 +222,8 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     time, spread, margin, place, before, after = (column[order] for column in columns)
     if not len(time):
         return []
-    away = touches.distances(samples.times, place[:, :2], positions, time)
-    chosen = touches.choose(away, time, _between(samples, positions, time), stranger)
+    away = touches.player_distances(samples.times, place[:, :2], positions, time)
+    chosen = touches.choose_players(away, time, _between(samples, positions, time), stranger)
     everybody = np.isfinite(away).sum(axis=0) >= _EVERYBODY
     kept = np.flatnonzero((chosen >= 0) | ~everybody)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
@@ -343,10 +340,9 @@ def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
     return BallEnd(time=end.time, kind=end.kind, x=end.x, y=end.y, player=earlier[-1] if earlier else "")
 
 
-def solve_ball(
-    source: Match | Track, progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None, start: float | None = None, end: float | None = None,
-) -> SolvedBall:
+def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | None = None,
+               cancelled: Callable[[], bool] | None = None, start: float | None = None,
+               end: float | None = None) -> SolvedBall:
     """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
 
     A track has one player: touches of others have the player "". Referees touch no ball. InputError where the source
@@ -360,14 +356,10 @@ def solve_ball(
     if isinstance(source, Track):
         unknown = ~source.ball_height_known[:, None] & [False, False, True]
         ball = np.where(unknown, np.nan, source.ball)
-        return solve(
-            source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
-            pitch=PITCH, progress=progress, cancelled=cancelled,
-        )  # fmt: skip
+        return solve(source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
+                     pitch=PITCH, progress=progress, cancelled=cancelled)
     playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
     players = [source.players[index] for index in playing]
-    return solve(
-        source.times[part], source.ball[part], source.positions[playing][:, part],
-        players=[player.id for player in players], teams=[player.team for player in players],
-        pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled,
-    )  # fmt: skip
+    return solve(source.times[part], source.ball[part], source.positions[playing][:, part],
+                 players=[player.id for player in players], teams=[player.team for player in players],
+                 pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled)

@@ -189,13 +189,12 @@ def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
     left = np.arange(len(pieces) - 1)
     knots = _knots(pieces, left, left + 1, times=times, cuts=cuts, upto=upto, begin=np.searchsorted(cuts, pieces.first),
                    player_cost=player_cost)
-    return Cuts(
-        time=knots.time, spread=knots.spread, touch=knots.touch < knots.free, margin=np.abs(knots.touch - knots.free),
-        place=knots.place, before=knots.before, after=knots.after, pieces=pieces,
-    )  # fmt: skip
+    return Cuts(time=knots.time, spread=knots.spread, touch=knots.touch < knots.free,
+                margin=np.abs(knots.touch - knots.free), place=knots.place, before=knots.before, after=knots.after,
+                pieces=pieces)
 
 
-def distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
+def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
     """(P, K) m over the ground from each player to the ball at moments `at` (K,), inf where a player is not there.
 
     times: (N,) s; ball: (K, 2) m, where it is then; positions: (P, N, 2) m.
@@ -218,7 +217,7 @@ def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = ST
     return np.minimum(cost, stranger)
 
 
-def choose(away: np.ndarray, times: np.ndarray, between: np.ndarray, stranger: float = STRANGER) -> np.ndarray:
+def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, stranger: float = STRANGER) -> np.ndarray:
     """(K,) the player of every touch, -1 for nobody: the cheapest chain by dynamic programming over the touches.
 
     away: (P, K) m. times: (K,) s. between: (P, K) m, a player's mean distance from the ball since the touch before.

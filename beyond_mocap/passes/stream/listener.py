@@ -75,10 +75,8 @@ class Listener:
     """Receives one stream at a time. protocol: of PROTOCOLS. hierarchy: text of a BVH HIERARCHY for streams without
     one. unit: metres per unit of the stream (None: guessed). seconds: that frames are kept."""
 
-    def __init__(
-        self, port: int = PORT, protocol: str = "udp", hierarchy: str | None = None, unit: float | None = None,
-        seconds: float = 20.0,
-    ):
+    def __init__(self, port: int = PORT, protocol: str = "udp", hierarchy: str | None = None, unit: float | None = None,
+                 seconds: float = 20.0):
         if protocol not in PROTOCOLS:
             raise InputError("protocol", f"{protocol!r}", f"one of {', '.join(PROTOCOLS)}")
         if not 1024 <= int(port) <= 65535:
@@ -107,10 +105,8 @@ class Listener:
                     self._server.listen(1)
             except OSError as error:
                 self._server.close()
-                raise InputError(
-                    f"port {self.port}", f"cannot be listened to ({error.strerror or error})", "a free port",
-                    "choose another one, or stop the program that listens there",
-                ) from None
+                raise InputError(f"port {self.port}", f"cannot be listened to ({error.strerror or error})",
+                                 "a free port", "choose another one, or stop the program that listens there") from None
         self._thread = threading.Thread(target=self._run, name="beyond_mocap stream", daemon=True)
         _alive.add(self)
         self._thread.start()

@@ -24,10 +24,8 @@ _SETTLED = 0.05
 class LiveHits:
     """Watches a listener for hits of a part. side: "left", "right", or "" for either. threshold: as in `analyse`."""
 
-    def __init__(
-        self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
-        tool: Tool | None = None,
-    ):
+    def __init__(self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
+                 tool: Tool | None = None):
         self.listener, self.part, self.threshold, self.tool = listener, part, threshold, tool
         sided = part in ("foot", "hand", "tool")
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)
