@@ -36,7 +36,6 @@ EVENT_SPREAD = 1.8  # s: three deviations of how far events that were not tied t
 
 TOLERANCE = 0.1
 """Seconds; a sample of a 10 Hz feed may lie so far from the true kick."""
-
 _COLUMNS = ("match", "row", "time_s", "until_s", "player", "part", "word", "note")
 
 

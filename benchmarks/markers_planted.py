@@ -14,7 +14,7 @@ from beyond_mocap.markers.cleaning.clean import clean
 from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_error import PlantedError, planted_error
+from beyond_mocap.synthetic.ground_truth.planted_error import planted_error
 from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
 from beyond_mocap.synthetic.throws import throw
 
@@ -56,11 +56,6 @@ def again(known: Planted, static: bool, chosen: ReconstructSettings) -> Reconstr
     return reconstruct(known.trial, known.static if static else None, settings=chosen)
 
 
-def off(known: Planted, made: Reconstruction) -> PlantedError:
-    """How far the result is from the truth."""
-    return planted_error(known, made.motion)
-
-
 def truth_table() -> list[str]:
     """One row per clip, set and static trial or none."""
     lines = [
@@ -84,7 +79,7 @@ def bone_table() -> list[str]:
     for name, marker_set in ON_BONE:
         known = planted(clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
         made = again(known, True, settings(marker_set))
-        error = off(known, made)
+        error = planted_error(known, made.motion)
         lines.append(effort.format_row([name, marker_set, f"{np.degrees(error.angle):.2f}",
                                         f"{np.degrees(error.raw_angle):.2f}", f"{1e3 * error.centre:.1f}",
                                         _rms_mm(made.solved.residual)]))
@@ -95,7 +90,7 @@ def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
     begin = [name, marker_set, "yes" if static else "no"]
     try:
         made = again(known, static, settings(marker_set))
-        error = off(known, made)
+        error = planted_error(known, made.motion)
     except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
         return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
     solved = made.solved
@@ -124,7 +119,7 @@ def filter_table() -> list[str]:
         known = planted(clip(name), marker_set, seed=2, noise=noise)
         for chosen in ("none", "butterworth", "kalman"):
             made = again(known, True, settings(marker_set, filter=chosen, plant=False))
-            error, (found, true, accelerated) = off(known, made), _hand(known, made.motion)
+            error, (found, true, accelerated) = planted_error(known, made.motion), _hand(known, made.motion)
             lines.append(effort.format_row([f"{name}, noise {1e3 * noise:g} mm", chosen,
                                             f"{np.degrees(error.angle):.2f}", f"{1e3 * error.centre:.1f}",
                                             f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2"]))

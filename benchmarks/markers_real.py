@@ -42,11 +42,6 @@ def timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
     return reconstruct(seen, still, settings=ReconstructSettings()), time.process_time() - begun
 
 
-def made(trial: str, static: str | None) -> Reconstruction:
-    """A trial's reconstruction."""
-    return timed(trial, static)[0]
-
-
 def trial_table() -> list[str]:
     """One row per trial."""
     lines = [
@@ -134,7 +129,7 @@ def radar_table() -> list[str]:
     """Pitches without a marker on the ball."""
     lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "told sigma m/s", "release s"])
     for trial in PITCHES:
-        body = made(trial, None)
+        body, _ = timed(trial, None)
         found = release(body.raw, body.motion)
         radar = found.radar
         lines.append(effort.format_row([trial, f"{found.speed:.1f}", "not told" if radar is None else f"{radar:.1f}",

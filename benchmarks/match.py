@@ -40,7 +40,6 @@ from beyond_mocap.synthesis.take import Take
 
 SECONDS = (1480.0, 1500.0)
 """Of the recorded half: players stand close together, so that there is something to keep apart."""
-
 WINDOW = 60.0
 STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)
 EVERY = 4

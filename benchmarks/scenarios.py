@@ -46,17 +46,16 @@ def section() -> list[str]:
     return lines
 
 
-def of_library(name: str, place: Path, numbers: Sequence[int] = NUMBERS) -> list[str]:
+def of_library(name: str, place: Path) -> list[str]:
     """One library, its cache kept in `place`."""
     folder, unit, cache = library_folder(name, place), LIBRARIES[name], place / "cache"
     cold, _ = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache, rebuild=True), 1)
     warm, library = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache))
-    reports = {number: report_of(library, number) for number in numbers}
+    reports = {number: report_of(library, number) for number in NUMBERS}
     took = [20.0 * report["seconds"]["total"] / report["duration_s"] for report in reports.values()]
-    orders = [(f"scenario {number}", *scenario(number)) for number in numbers]
     return [f"### Library {name}", "", f"- library: {cold:.2f} s from text, {warm:.2f} s from its cache",
             f"- {np.mean(took):.2f} s for 20 s of motion (target 0.5), {max(took):.2f} at most",
-            f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "", *edit_times(library, orders), ""]
+            f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "", *edit_times(library, map(scenario, NUMBERS)), ""]
 
 
 def report_of(library: Library, number: int) -> dict:
@@ -82,11 +81,11 @@ def figures(reports: Mapping[int, Mapping]) -> list[str]:
     return lines
 
 
-def edit_times(library: Library, orders: Iterable[tuple[str, Track, Timeline]], runs: int = 3) -> list[str]:
-    """Markdown lines: a row per kind of edit, over all orders (name, track, timeline); seconds are the best of
+def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs: int = 3) -> list[str]:
+    """Markdown lines: a row per kind of edit, over all orders (track, timeline); seconds are the best of
     `runs`."""
     figures: dict[str, list[tuple[float, ...]]] = {}
-    for _, track, timeline in orders:
+    for track, timeline in orders:
         before = synthesize(library, Plan(track=track, timeline=timeline, nearest=True))
         for kind, plan in _edits(before.plan):
             best, after = _timed(library, plan, before, runs)

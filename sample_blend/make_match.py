@@ -39,7 +39,6 @@ PLAYERS = {"home_1": "Ada Keeper", "home_4": "Ben Back", "home_7": "Cora Wing", 
            "away_14": "Ivo Fresh"}
 PRESENT = {"away_9": (0.0, 9.0), "away_14": (11.0, SECONDS)}
 """Seconds in which players are on the pitch who are not there all the time."""
-
 PLACES = {
     "home_1": ((0, -47, 0), (12, -44, 1.5), (24, -47, 0.5)),
     "home_4": ((0, -20, -9), (9, -12, -6), (15, -6, 2), (24, -13, 6)),
@@ -80,7 +79,6 @@ TOUCHES = (Touch("home_10", "kick right low inside", "foot", (-13, -8), 1.5),
            Touch("away_14", "kick right low top", "foot", (-43.7, 0.8), 1.6),
            Touch("home_1", "receive right foot low", "foot", (-43, 0.8), 2.0))
 """All touches in order; the first is at KICK_OFF, each later one when the ball is there."""
-
 EVENTS = {"kick": "pass", "header": "pass", "receive": "ball touch"}
 """What the provider calls a touch, by its first word; it does not tell of dribbles."""
 

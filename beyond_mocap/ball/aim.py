@@ -202,7 +202,7 @@ class _Problem:
         bool: whether there is one that is at the target's height in time."""
         way = self.target - self.start
         drag = self.ball.linear_drag + self.ball.drag * length(way) / self.seconds
-        level = way[:, :2] / (_shares(drag * self.seconds)[0] * self.seconds)[:, None]
+        level = way[:, :2] / (batch.drag_shares(drag * self.seconds)[0] * self.seconds)[:, None]
         upward, found = self._upward(drag)
         return np.column_stack([level, upward]), found
 
@@ -210,7 +210,7 @@ class _Problem:
         """(B,) m/s: the highest launch upward with which such a ball is at the target's height in time, and (B,) bool
         whether there is one; else the nearest to it."""
         gravity, low = self.ball.gravity, self.ground + self.ball.radius
-        first, second = _shares(drag * self.seconds)
+        first, second = batch.drag_shares(drag * self.seconds)
         direct = (self.target[:, 2] - self.start[:, 2] + gravity * self.seconds**2 * second) / (self.seconds * first)
         if not self.bounces:
             return direct, np.ones(len(direct), bool)
@@ -342,17 +342,9 @@ def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np
 
 def _fallen(height, upward, drag, seconds, gravity: float) -> tuple[np.ndarray, np.ndarray]:
     """Height and speed upward after `seconds` under linear drag."""
-    first, second = _shares(drag * seconds)
+    first, second = batch.drag_shares(drag * seconds)
     place = height + upward * seconds * first - gravity * seconds**2 * second
     return place, upward * np.exp(-drag * seconds) - gravity * seconds * first
-
-
-def _shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(1 - e^-d) / d, and (1 - that) / d, for d >= 0."""
-    small = drag < 1e-4
-    safe = np.where(small, 1.0, drag)
-    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
-    return first, np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
 
 
 def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

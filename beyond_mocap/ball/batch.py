@@ -96,6 +96,14 @@ def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarra
     return np.stack(places, axis=1), np.stack(velocities, axis=1)
 
 
+def drag_shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(1 - e^-d) / d, and (1 - that) / d, for d >= 0; by their series where d is small."""
+    small = drag < 1e-4
+    safe = np.where(small, 1.0, drag)
+    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
+    return first, np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
+
+
 def _has_closed_form(balls: Balls, ball: Ball) -> bool:
     return ball.drag == 0.0 and not ball.friction and (ball.lift[0] == 0.0 or not balls.spin.any())
 
@@ -211,11 +219,7 @@ def _closed(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np
     """Flight under gravity and linear drag alone, any `steps` (W,) s long."""
     drag = ball.linear_drag * steps
     falling = np.array([0.0, 0.0, -ball.gravity])
-    # (1 - e^-d) / d and (1 - that) / d, by their series where d is small
-    small = drag < 1e-4
-    safe = np.where(small, 1.0, drag)
-    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
-    second = np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
+    first, second = drag_shares(drag)
     place = position + velocity * (steps * first)[:, None] + falling * (steps**2 * second)[:, None]
     faster = velocity * np.exp(-drag)[:, None] + falling * (steps * first)[:, None]
     return place, faster, spin * np.exp(-ball.spin_decay * steps)[:, None]

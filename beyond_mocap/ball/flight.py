@@ -22,7 +22,6 @@ STANDS_STILL = 1e-6
 """m/s of the lowest point below which a ball rolls."""
 FINE = 1.0 / 480.0
 """s: the steps in which rotations are summed up."""
-
 _IMPACT_STEP = 1.0 / 480.0  # s between the places that are looked at first
 
 _LONGEST_TO_WALL = 6.0  # s that a flight is followed

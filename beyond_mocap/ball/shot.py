@@ -23,7 +23,6 @@ from .physics import Ball, length
 
 RISE = 0.3
 """How much the first guess of a launch leads up, for one that leads level."""
-
 _TIMES = 28  # flight times tried, evenly spaced in their logarithm
 _ELEVATIONS = np.radians(np.arange(0.0, 76.0, 5.0))  # above the line to the target
 _SLACK = 1.03  # on a speed, for what lies between elevations

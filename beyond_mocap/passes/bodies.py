@@ -50,13 +50,10 @@ from .way import HitOrder, Placed, Stance, needed, placed, way
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
-
 FASTER = 1.15
 """Times the library's highest speed that a player may go without being told."""
-
 OWN_HEAD = 0.3
 """Seconds around a header in which the head moves as recorded; it goes over within as many more."""
-
 _PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # "hand" itself is no label
 _WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
 
@@ -86,21 +83,20 @@ class PlayerMotion:
 
 
 def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], ball: BallPath,
-                  ball_radius: float = BALL_RADIUS, frames: int | None = None, fps: float = 30.0,
-                  settings: BodySettings = BodySettings(), progress: Callable[[float, str], None] | None = None,
+                  ball_radius: float = BALL_RADIUS, fps: float = 30.0, settings: BodySettings = BodySettings(),
+                  progress: Callable[[float, str], None] | None = None,
                   cancelled: Callable[[], bool] | None = None) -> PlayerMotion:
     """The motion of a player who begins at `stance` and strikes as `orders` say.
 
-    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the
-    ball's). The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
+    ball: its path at `fps` over the whole scene, which is the motion's. The same input gives the same bits. InputError
+    for orders outside the scene or two at once; Cancelled.
     """
     from threadpoolctl import threadpool_limits
 
-    count = len(ball.times) if frames is None else frames
     orders = sorted(orders, key=lambda order: order.time)
     _check(orders, ball.times, fps)
     with threadpool_limits(limits=1):
-        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=count, fps=fps,
+        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=len(ball.times), fps=fps,
                      settings=settings).made(progress, cancelled)
 
 

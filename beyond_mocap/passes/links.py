@@ -18,8 +18,8 @@ from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, pose_kinematics
 from . import kept
+from .pass_scene import BONES
 
-BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
 _FINE = 60.0
 
 _known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()

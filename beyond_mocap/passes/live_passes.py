@@ -30,13 +30,10 @@ from .way import Stance
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""
-
 FADE = 0.4
 """Seconds over which what somebody did gives way to what he does now."""
-
 AHEAD = 0.6
 """Metres from the holder to the ball at first."""
-
 _TAIL, _SWAY = 4.0, 2.5
 _STOPPED = 1.2
 _ROUNDS = 2
@@ -111,7 +108,7 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
         if progress:
             progress(number / len(names), f"{player.name} stands")
         stance = Stance(player.place, scene.facing(player.name))
-        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, frames=None, fps=scene.fps,
+        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                               settings=_settings(scene), cancelled=cancelled)
         players[player.name] = Played(start, _lasting(moved.take.motion))
     return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
@@ -141,7 +138,7 @@ def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: s
     motions = {}
     for name in (one.giver, one.receiver):
         moved = player_motion(library, stances[name], plan.orders(name), ball=path, ball_radius=ball_of(scene).radius,
-                              frames=None, fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
+                              fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
         motions[name] = _lasting(moved.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path

@@ -27,15 +27,12 @@ from .strike_choice import StrikeMoments, launched_from
 
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""
-
 EIGHTH = 0.25 * np.pi  # rad: an eighth of a whole turn
 MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
 CHANCE, AGAIN = 0.4, 0.6
 """m/s by which chance tells hit motions apart that are as good, and what each use before by the same player costs."""
-
 SHORTEST, LONGEST, PER_BOUNCE, TRIED = 0.4, 2.6, 0.5, 16
 """Seconds of travel that are tried, from the shortest to the longest, which is longer for each bounce, and how many."""
-
 LIES = 0.2
 """Metres above where a ball lies on the ground up to which a foot's strike may be at a ball that lies there."""
 

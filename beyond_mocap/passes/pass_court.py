@@ -20,53 +20,38 @@ from .strike_choice import StrikeMoments
 
 ON_TARGET = 0.02
 """Metres beside its target with which a ball has come to it."""
-
 SERVED_FROM, SERVED_HEIGHT = 0.4, 1.2
 """Metres before who serves, and above the ground, from where the ball comes in."""
-
 SERVED_SECONDS, SERVED_PER_METRE, LONGEST_SERVE = 0.5, 0.07, 3.0
 """How long it flies, how much longer for each metre, and at most."""
-
 TIMES = np.linspace(0.1, 2.5, 25)
 """Seconds after a strike at which natural ways are looked at."""
-
 SPEEDS = {"toss": (4.5, 8.0), "pass": (5.0, 12.0), "attack": (9.0, 25.0)}
 """m/s between which a ball of each kind sets out, by its name."""
-
 SPINS = {"toss": -0.1, "pass": -0.1, "attack": 0.2}
 """Shares of the spin with which a ball rolls at its speed: struck from below it turns back, struck hard it turns
 forward."""
-
 LONG = {"toss": 1.5, "pass": 1.5, "attack": 0.9}
 PER_SECOND = 2.0
 """Seconds of travel beyond which a ball of each kind takes long, and what each more costs."""
-
 RISES = {"toss": (0.7, 0.95), "pass": (0.4, 0.8), "attack": (-0.4, 0.3)}
 """Sines of the angles over the ground between which a ball of each kind sets out."""
-
 BEHIND, PER_RADIAN = np.radians(100.0), 2.0
 """Radians from where a body faces beyond which it does not see a ball come, and what each more costs."""
-
 MOST_MISS, PER_TRAVEL = 4.0, 0.8
 IN_THE_WAY, PERSON, TALL = 6.0, 0.45, 1.9
 """What it costs to fly through the middle of somebody, his radius with room around him and his height in m."""
-
 THROUGH = 0.35 * IN_THE_WAY
 """What it costs at least where a ball meets the body itself."""
-
 PUSHED = 2.0
 """What it costs that a ball is pushed across the way of the part; the opposite way twice as much."""
-
 RISES_STILL, PER_RISE = 1.0, 0.5
 """m/s upward with which a ball may still come in, and what each more costs: it has bounced a moment ago."""
-
 OWN_BODY, TRUNK, TRUNK_FROM = 8.0, 0.22, 0.8
 """What it costs to go through the middle of a trunk, its radius and lower end in m."""
-
 TRUNK_TO = {"head": 1.35, "chest": 0.0}
 UPRIGHT = 1.7
 """Metres up to which a ball stays clear of the body of who strikes it, by what he strikes with, else UPRIGHT."""
-
 A_MOMENT = 1e-3  # s before a ball arrives at which its speed is read
 _STEPS = 30  # pieces into which a flight is cut
 

@@ -31,17 +31,13 @@ LIMP = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
 
 LONGER = 6
 """How many longer flights are tried at most where there is too little time."""
-
 Need = Callable[[str, "HitOrder | Stance", HitOrder], float]
 """Seconds that a player needs from one strike, or from standing, to the next."""
-
 BESIDE = 0.45
 """Metres by which a missed ball goes past the part."""
-
 ROUNDS = 5
 LEAP = 3.0
 """m/s between two launches above which the ball takes quite another way, such as into the ground instead of up."""
-
 NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
 """Frames by which a flight may be longer or shorter than was best, where places have moved."""
 

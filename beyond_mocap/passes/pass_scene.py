@@ -29,17 +29,13 @@ LIMITS = {**{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 
 """Least and most of a scene's numbers."""
 MOST_PASSES, MOST_PLAYERS = 1000, 100
 BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
-"""Bones whose weights in eq. 1 can be set (`links.BONES`)."""
-
+"""Bones that poses are compared by in eq. 1, and whose weights can be set."""
 RESERVED = ("ball", "strikes", "scene")
 """Names that other files of a scene have."""
-
 LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
 """Metres that a tool in the hand has at most."""
-
 FAR = 100.0
 """Metres between two players, above which nobody passes."""
-
 Place = tuple[float, ...]
 
 

@@ -34,7 +34,6 @@ from .way import HitOrder, Stance
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
-
 BALL_LIMITS: dict[str, Any] = {
     **{name: (setting("passes", name).least, setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
@@ -42,10 +41,8 @@ BALL_LIMITS: dict[str, Any] = {
     "rolling": (0.01, 20.0), "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Least and most of a ball's numbers."""
-
 PLANNED = 0.3
 """Share of the whole work after which the plan stands."""
-
 _SIDED = ("foot", "hand", "tool")
 
 
@@ -298,7 +295,7 @@ def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, 
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
     settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
     moved = player_motion(library, stance, orders, ball=ball, ball_radius=ball_of(scene).radius / size,
-                          frames=len(path.times), fps=scene.fps, settings=settings, progress=progress,
+                          fps=scene.fps, settings=settings, progress=progress,
                           cancelled=cancelled)  # fmt: skip
     if size == 1.0:
         return moved

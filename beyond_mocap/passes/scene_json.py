@@ -20,7 +20,6 @@ from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weigh
 
 LARGEST = 10_000_000
 """Bytes of a file above which it is no scene."""
-
 _OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
 
 SAMPLES: dict[str, dict] = {

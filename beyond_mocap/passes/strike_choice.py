@@ -32,7 +32,6 @@ _SIDED = ("foot", "hand", "tool")
 
 MOST_FRAMES = 7
 """Moments that are looked at in one ball stretch at most, spread evenly."""
-
 _BACK_ON_LIMB = 0.2  # of a normal's length that may point up the limb, where the shin or the forearm is
 
 

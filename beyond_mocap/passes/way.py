@@ -24,19 +24,14 @@ from ..motion.motion import at_frames, pose_kinematics
 
 LEAD, TIMELY = 1.6, 0.4
 """Seconds of run-up and run-out that are taken from the recording at most, and m/s that one of them is worth."""
-
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
-
 CROUCHED, LIFTED = 3.0, 0.25
 """m/s of unrest that a metre below or above the usual height of the hips is, and that a foot in the air is."""
-
 WALK, HASTE = 1.1, 2.2
 """m/s at which he goes from one place to the next where time allows, and where it does not."""
-
 SPEEDING = 1.6
 """m/s^2 at which he comes to rest and sets out."""
-
 _SETTLE = 0.4  # s that setting out and stopping take beside the way itself
 _ROOM = 1.25  # times what he needs, from which on he stands between two hits
 _SHARE = 0.7  # of the time between two hits that run-out and run-up may take
@@ -190,7 +185,7 @@ def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[P
 @dataclass(frozen=True, eq=False)
 class Way:
     """positions (T, 2) m of the path without sway; facing (T,) rad within the hit motions, unwrapped the short way
-    round from each to the next, NaN between them; first, last: facing before and after all of them."""
+    round from each to the next, NaN between them."""
 
     positions: np.ndarray
     facing: np.ndarray

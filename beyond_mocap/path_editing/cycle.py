@@ -27,20 +27,15 @@ from .path_frame import Residuals
 
 FADE_SECONDS = 0.2
 """Half a fade, at most; a short loop is faded over its own length."""
-
 MOST_SCALE, KEPT_SCALE = 0.05, 0.009
 """Shares by which strides are made longer or shorter so that the motion's end falls on the path's: where that end is
 worth it, and where the speed is to be kept."""
-
 MOST_FRAMES = 108_000
 """An hour at 30 frames per second."""
-
 SAME_LENGTH = 1e-3
 """Metres that path and motion may differ and count as of one length."""
-
 SEEN = 0.35
 """How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
-
 _ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
 _KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
 _CREEPS = 0.2  # m/s below which a motion stays where it is

@@ -26,29 +26,21 @@ from .ground_contact import Surface, footing
 MOST_SHIFT = 0.45
 """Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the
 spot turn otherwise on another path."""
-
 FIRST_DROP = 0.015
 """Metres that the pelvis is lowered before a heel is raised where a leg does not reach."""
-
 DROP_BY_SLOPE = 0.15
 """Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
-
 SINK_BY_SLOPE = 0.15
 """Metres by which the pelvis is lower, times the slope: knees bend more on slopes, up and down."""
-
 SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
-
 LONGEST = (0.3, 1.3)
 """How many times as long as it was a step is made at least and at most."""
-
 BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
 """Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
 of a smooth course."""
-
 LEAST_BEND = 0.05
 """Root of the metres that a leg always lacks to its full length."""
-
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])

@@ -27,14 +27,11 @@ from ..motion.path.terrain import Terrain
 
 STEEPEST = 0.7
 """Slope of the ground under a foot beyond which it is an edge that the foot stands on, flat."""
-
 CLEARANCE, MOST_LIFT = 0.02, 0.35
 """Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at
 most."""
-
 ABOVE = 1.0
 """Metres above the path below which the ground is looked for: a bridge overhead is not stood on."""
-
 _EVERY = 0.03  # metres between the places at which a path's height is looked up
 _BEYOND = 1.5  # metres by which its ends are continued
 _ROUNDS = 4
@@ -43,16 +40,12 @@ _LONGEST_SWING = 1.5  # seconds; a foot that is longer in the air follows the gr
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """(places (N, 2) m, frames (N,) int in which a foot is there) -> heights (N,) m and slopes (N, 2), by x and by y."""
-
 TIGHT = 0.3
 """Metres of radius, about a foot's length, below which a bend is too tight to walk on."""
-
 STEEP = 60.0
 """Degrees from which on a path is no ground."""
-
 LASTING = 0.5
 """Metres of path, within a metre, that have to be so: a single corner is only a corner."""
-
 _JOINED = 0.5  # seconds between two such stretches that are one
 _FADE = 0.12  # seconds, twice of which go by from feet that are planted to feet that are not
 _AS_OWN = 1.5  # times the own path's curvature up to which a bend is the motion's own

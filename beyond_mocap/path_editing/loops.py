@@ -21,7 +21,6 @@ from .path_frame import Residuals
 
 WINDOW_SECONDS = 0.12
 """Pairs are compared over so much before and after."""
-
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
 _ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24
 _STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ

@@ -30,7 +30,6 @@ FRAMES = ("path", "tangent", "absolute")
 
 CLEAR = 0.25
 """m/s over the ground from which on a direction of travel is believed; below, the heading is carried across."""
-
 _FULL, _POWER, _MOST = 0.5, 8, 1e6  # weight of a direction: (speed / _FULL) ** _POWER, at most _MOST
 _STIFF, _TIGHT = 0.1, 0.03  # seconds: of the heading's smoothness, and beyond which a gap is crossed in a straight line
 _STILL = 0.01  # m/s: a path passed slower has no heading
@@ -39,7 +38,6 @@ _COMES, _SURELY = 1.0, 0.6  # seconds; m/s above which speed alone counts
 KINDS = ("spline", "polynomial")
 SECONDS = 0.3
 """Sway faster than about 0.7 of a second goes by the path, slower is a way taken."""
-
 _ORDER, _PASSES = 3, 4
 _ENDS, _ENDS_SECONDS = 5.0, 0.15  # times that the first and last frame count more, and how soon that is over
 _FLAT = 0.10  # metres between the lowest and highest ground that a flat recording seems to have

@@ -18,10 +18,8 @@ from ..motion.path.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
 """Metres over which corners are rounded, some."""
-
 SHORTEST = 0.2
 """Metres that a line has at least."""
-
 _SAMPLE = 1 / 4  # of the rounding, between samples of the line
 _PIECE = 1 / 2  # of the rounding, a piece of the spline
 _LONGEST = 5000  # roundings: longer lines are rounded more

@@ -32,13 +32,10 @@ from .path_frame import Residuals
 
 SHORTER = 0.4
 """By how much steps are shorter on slopes: this times the slope, as a share."""
-
 BEND = 2.0
 """Metres of radius below which bends slow."""
-
 LEAST_STEP, LEAST_SPEED = 0.8, 0.35
 """Shares of a step's length on the level, and of the speed, that are kept at least."""
-
 _GRID = 0.05  # metres
 _SMOOTH = 0.7  # metres of path over which slopes and bends are felt
 _STRIDE_SECONDS, _CREEPS = 0.5, 0.05  # s over which a stride is told, m/s that say nothing about it
@@ -46,10 +43,8 @@ _MOVES = 0.4  # m/s; whoever is slower tells nothing about bends
 
 REACHED = 1e-3
 """Metres by which a motion may overshoot the path and still be of its length."""
-
 SHORTEST = 1e-6
 """Metres that a path is long at least."""
-
 _STEP = 0.5  # metres; a path or lap shorter than this is told
 _SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: of a lap that is begun anew, and of a motion's end that nobody misses
 

@@ -38,14 +38,11 @@ _SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
 """m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
 smooth as these."""
-
 INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
 """Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some
 3 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is felt."""
-
 OUT_OF_REACH = 0.03
 """Metres that a foot may be short of its place without being told."""
-
 STILL = 0.05
 """Metres of path below which a motion stands still."""
 

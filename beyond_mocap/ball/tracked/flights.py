@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.time_series import interpolate
@@ -214,8 +216,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
     path = interpolate(since, piece.times - piece.start, places[:, :2])
     residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
-    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
-                     residual=residual, bounces=piece.bounces)
+    return replace(piece, positions=places, velocities=speeds, residual=residual)
 
 
 def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
@@ -235,8 +236,7 @@ def _falling(piece: BallPiece, height: float) -> BallPiece:
     higher = falls > piece.positions[:, 2]
     places, speeds = piece.positions.copy(), piece.velocities.copy()
     places[higher, 2], speeds[higher, 2] = falls[higher], -FOOTBALL.gravity * since[higher]
-    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
-                     residual=piece.residual, bounces=piece.bounces)
+    return replace(piece, positions=places, velocities=speeds)
 
 
 def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -203,14 +203,13 @@ def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
     seen = samples.measured[part]
-    piece = SolvedPath((BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3),
-                                  residual=np.nan, bounces=np.zeros(0)),))
-    off = piece.residuals(samples.times[part], samples.positions[part])[seen]
+    piece = BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3), residual=np.nan,
+                      bounces=np.zeros(0))
+    off = SolvedPath((piece,)).residuals(samples.times[part], samples.positions[part])[seen]
     fast, high = np.linalg.norm(speeds[:, :2], axis=1).max(), places[:, 2].max()
     kind = "flight" if high > 0.5 else "still" if fast < 0.3 else "roll"
     residual = float(np.sqrt(np.mean(off**2))) if len(off) else np.nan
-    return BallPiece(times=at, positions=places, velocities=speeds, kind=kind, spin=np.zeros(3), residual=residual,
-                     bounces=np.zeros(0))
+    return replace(piece, kind=kind, residual=residual)
 
 
 def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
@@ -337,7 +336,7 @@ def _sure(margin: float, away: np.ndarray, player: int) -> float:
 
 def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
     earlier = [touch.player for touch in solved if touch.time < end.time]
-    return BallEnd(time=end.time, kind=end.kind, x=end.x, y=end.y, player=earlier[-1] if earlier else "")
+    return replace(end, player=earlier[-1] if earlier else "")
 
 
 def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | None = None,

@@ -29,10 +29,8 @@ LOOPBACK = "127.0.0.1"
 PORT = 7001
 PROTOCOLS = ("udp", "tcp", "call")
 """Datagrams that come in; who connects to us; or we call who waits for it, as Axis Neuron does."""
-
 STALLED = 1.0
 """Seconds without a frame after which a stream has stalled."""
-
 _SPOKEN = {"udp": "UDP", "tcp": "TCP", "call": "TCP"}
 _TICK = 0.2
 _CHUNK = 1 << 16

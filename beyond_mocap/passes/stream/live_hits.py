@@ -15,7 +15,6 @@ from .listener import Arrived, Listener, poses
 
 WINDOW = 4.0
 """Seconds that are looked at."""
-
 _RATE = 60.0
 _LEAST = 0.5
 _SETTLED = 0.05

@@ -17,7 +17,6 @@ from .listener import LOOPBACK
 FORMS = ("bvh", "neuron")
 WAYS = ("udp", "tcp", "serve")
 """Datagrams; connecting to who listens; or waiting for who calls, as Axis Neuron does."""
-
 _HEADER_EVERY = 1.0
 _TICK = 0.2
 _AVATAR = "0 Avatar00 "
