@@ -20,7 +20,7 @@ help:
 	@echo 'make demo           the sample match, synthesized and rendered into build/demo'
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        the shipped networks anew: made throws and kicks, trained on; some minutes'
-	@echo 'make tables         the tables in docs/ that come from the code: providers'
+	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
@@ -97,7 +97,7 @@ weights: training
 	done
 
 tables: venv
-	.venv/bin/python packaging/provider_tables.py
+	.venv/bin/python packaging/pages.py
 
 extension: venv
 	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)

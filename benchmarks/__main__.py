@@ -25,20 +25,19 @@ from beyond_mocap import __version__  # noqa: E402
 
 SECTIONS = {  # name -> heading, (subheading, module, function) of each part
     "scenarios": ("Synthesis", (("", "scenarios", "section"),)),
-    "match": ("Players of a match", (("", "match_speed", "section"),)),
-    "crowd": ("Everybody of a match", (("", "match_crowd", "section"),)),
+    "match": ("Players of a match", (("", "match", "speed_section"),)),
+    "crowd": ("Everybody of a match", (("", "match", "crowd_section"),)),
     "paths": ("Path editing", (("", "path_editing", "section"),)),
     "ball": ("The tracked ball", (("", "ball_touches", "section"),)),
     "passes": ("Passes and solved touches", (("", "ball_contact", "section"),)),
-    "markers": ("Markers", (
-        ("Markers planted on known motions", "markers_planted", "truth_table"),
-        ("The same on bone", "markers_planted", "bone_table"),
-        ("Filters on planted markers", "markers_planted", "filter_table"),
-        ("Gaps, swaps, jumps and lost labels", "markers_planted", "fault_table"),
-        ("Frames a second", "markers_planted", "speed_table"), ("Real trials", "markers_real", "trial_table"),
-        ("Releases of planted throws", "markers_release", "planted_table"),
-        ("Pitches against the radar", "markers_release", "radar_table"),
-    )),
+    "markers": ("Markers", (("Markers planted on known motions", "markers_planted", "truth_table"),
+                            ("The same on bone", "markers_planted", "bone_table"),
+                            ("Filters on planted markers", "markers_planted", "filter_table"),
+                            ("Gaps, swaps, jumps and lost labels", "markers_planted", "fault_table"),
+                            ("Frames a second", "markers_planted", "speed_table"),
+                            ("Real trials", "markers_real", "trial_table"),
+                            ("Releases of planted throws", "markers_real", "planted_table"),
+                            ("Pitches against the radar", "markers_real", "radar_table"))),
     "throws": ("Throws and kicks", (("", "throws", "section"),)),
 }  # fmt: skip
 LIMIT = 900.0

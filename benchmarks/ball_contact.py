@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks import effort
-from benchmarks.markdown import head, row
+from benchmarks.effort import format_head, format_row
 from benchmarks.places import LIBRARIES, ROOT, library_folder, scenario
 from beyond_mocap.ball.contact import striking_surface
 from beyond_mocap.evaluation.report import cell, evaluate
@@ -23,7 +23,6 @@ from beyond_mocap.synthesis.synthesize import synthesize
 
 SCENES = ("three", "six", "volley_net", "racquet", "dropped")
 SAMPLES = ROOT / "sample_blend"
-MEANT = 0.005  # metres, the target
 
 
 def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
@@ -54,12 +53,10 @@ def scene_row(name: str, library: Library, label: str) -> str:
     took, made = effort.seconds(lambda: passes(library, scene), 1)
     apart, off = gaps(made)
     moved = np.concatenate([player.moved for player in made.players])
-    return row([
-        f"{name}, {label}", str(len(made.plan.strikes)), str(len(apart)),
-        f"{1000 * np.median(apart):.1f} / {1000 * apart.max():.1f}", f"{1000 * off.max():.1f}",
-        f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}",
-        str(len(made.warnings)),
-    ])  # fmt: skip
+    return format_row([f"{name}, {label}", str(len(made.plan.strikes)), str(len(apart)),
+                       f"{1000 * np.median(apart):.1f} / {1000 * apart.max():.1f}", f"{1000 * off.max():.1f}",
+                       f"{100 * np.nanmax(moved, initial=0.0):.0f}", f"{made.plan.seconds:.1f}", f"{took:.1f}",
+                       str(len(made.warnings))])
 
 
 def take_rows(name: str, library: Library) -> list[str]:
@@ -67,30 +64,27 @@ def take_rows(name: str, library: Library) -> list[str]:
     rows = []
     for number in (1, 2, 3, 4, 5):
         track, timeline = scenario(number)
-        plan = Plan(
-            track=track, timeline=timeline, library=library.folder, nearest=True, method="path", solve_touches=True
-        )
+        plan = Plan(track=track, timeline=timeline, library=library.folder, nearest=True, method="path",
+                    solve_touches=True)
         report = evaluate(synthesize(library, plan), track, library)
         for key in report["keys"]:
             gap, moved = key["met_gap_m"], key["solved_time_s"]
             if gap is not None and np.isfinite(gap):
-                rows.append(row([
-                    f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
-                    "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}", cell(key["ball_shift_m"]),
-                    cell(key["time_error_s"]),
-                ]))  # fmt: skip
+                rows.append(format_row([f"{name}, scenario {number}", " ".join(key["labels"]), f"{key['time_s']:.2f}",
+                                        "-" if moved is None else f"{moved:.2f}", f"{1000 * gap:.1f}",
+                                        cell(key["ball_shift_m"]), cell(key["time_error_s"])]))
     return rows
 
 
 def section() -> list[str]:
     """Lines for results.md."""
-    lines = head(("passing scene, library", "strikes", "that touch", "gap mm (median / worst, target 5)",
+    lines = format_head(("passing scene, library", "strikes", "that touch", "gap mm (median / worst, target 5)",
                   "ball beside the arrival mm", "part moved cm", "seconds of scene", "seconds to make",
                   "warnings"))  # fmt: skip
     with tempfile.TemporaryDirectory() as place:
         own = build(SAMPLES / "passes" / "library", cache_dir=Path(place))
         lines += [scene_row(name, own, "its own") for name in SCENES]
-        lines += ["", *head(("take at solved touches", "words", "asked s", "solved s", "gap mm (target 5)",
+        lines += ["", *format_head(("take at solved touches", "words", "asked s", "solved s", "gap mm (target 5)",
                              "ball moved m", "time off s"))]  # fmt: skip
         for name in LIBRARIES:
             folder = library_folder(name, Path(place))

@@ -1,4 +1,4 @@
-"""What it costs: seconds to read, to build and to load, and the memory of a run."""
+"""How sections measure and report: seconds of the processor, what reading, building and memory cost, rows of tables."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -93,10 +94,8 @@ def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
         return "peak memory: not known on this system"
     track, words = scenario_files(number)
     with tempfile.TemporaryDirectory() as out:
-        command = [
-            sys.executable, "-m", "beyond_mocap", "synthesize", "--library", folder, "--cache", cache, "--track", track,
-            "--annotations", words, "--out", Path(out) / "out.bvh", "--nearest",
-        ]
+        command = [sys.executable, "-m", "beyond_mocap", "synthesize", "--library", folder, "--cache", cache, "--track",
+                   track, "--annotations", words, "--out", Path(out) / "out.bvh", "--nearest"]
         if LIBRARIES[name]:
             command += ["--unit", str(LIBRARIES[name])]
         quiet = subprocess.DEVNULL
@@ -107,3 +106,13 @@ def peak_memory(name: str, folder: Path, cache: Path, number: int = 2) -> str:
     kilo = 1024 if sys.platform == "darwin" else 1
     took, peak = used.ru_utime + used.ru_stime, used.ru_maxrss / 1024**2 / kilo
     return f"scenario {number} by the command, imports and cached library counted: {took:.1f} s, {peak:.2f} GiB at most"
+
+
+def format_head(names: Sequence[str]) -> list[str]:
+    """The two lines that begin a table."""
+    return [format_row(names), "|" + "---|" * len(names)]
+
+
+def format_row(cells: Iterable[str]) -> str:
+    """One line of a table."""
+    return f"| {' | '.join(cells)} |"

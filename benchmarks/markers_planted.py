@@ -7,32 +7,28 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks import markdown
+from benchmarks import effort
 from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.files.bvh import bvh
 from beyond_mocap.markers.cleaning.clean import clean
 from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
 from beyond_mocap.motion.motion import Motion
-from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, PlantedError, planted, planted_error
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted, planted_error
 from beyond_mocap.synthetic.throws import throw
 
-CLIPS = {
-    "walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_running_1.bvh", 0, 360),
-    "kick": ("cmu10/10_01.bvh", 200, 560), "basketball": ("cmu10/train_basketball_1.bvh", 200, 560),
-    "pitch": ("cmu_pitch/124_01.bvh", 260, 600),
-    "run, LAFAN1": ("lafan1/fallAndGetUp1_subject4_run_filtered.bvh", 0, 360),
-    "kick, LMD": ("lmd/Player1/P1_S01_penalty_kick.bvh", 0, 360),
-}
+CLIPS = {"walk": ("cmu10/test_walking_1.bvh", 0, 360), "run": ("cmu10/test_running_1.bvh", 0, 360),
+         "kick": ("cmu10/10_01.bvh", 200, 560), "basketball": ("cmu10/train_basketball_1.bvh", 200, 560),
+         "pitch": ("cmu_pitch/124_01.bvh", 260, 600),
+         "run, LAFAN1": ("lafan1/fallAndGetUp1_subject4_run_filtered.bvh", 0, 360),
+         "kick, LMD": ("lmd/Player1/P1_S01_penalty_kick.bvh", 0, 360)}
 """Recording, first and last frame."""
 SHIPPED = {"lower_body": "plug_in_gait_legs"}
 """Planted set -> the shipped one that describes it, where the names differ."""
-TRIED = (
-    ("walk", "plug_in_gait"), ("walk", "driveline"), ("walk", "sprinter"), ("walk", "full"), ("walk", "lower_body"),
-    ("run", "plug_in_gait"), ("run", "sprinter"), ("kick", "plug_in_gait"), ("basketball", "driveline"),
-    ("pitch", "driveline"), ("pitch", "plug_in_gait"), ("throw", "driveline"), ("run, LAFAN1", "driveline"),
-    ("kick, LMD", "plug_in_gait"),
-)
+TRIED = (("walk", "plug_in_gait"), ("walk", "driveline"), ("walk", "sprinter"), ("walk", "full"),
+         ("walk", "lower_body"), ("run", "plug_in_gait"), ("run", "sprinter"), ("kick", "plug_in_gait"),
+         ("basketball", "driveline"), ("pitch", "driveline"), ("pitch", "plug_in_gait"), ("throw", "driveline"),
+         ("run, LAFAN1", "driveline"), ("kick, LMD", "plug_in_gait"))
 ON_BONE = (("walk", "plug_in_gait"), ("walk", "driveline"), ("pitch", "driveline"))
 SPOILED = (("walk", "plug_in_gait"), ("basketball", "driveline"), ("pitch", "driveline"), ("run", "sprinter"))
 TIMED = (("throw", "full"), ("pitch", "driveline"), ("basketball", "plug_in_gait"), ("run", "sprinter"))
@@ -59,11 +55,6 @@ def again(known: Planted, static: bool, chosen: ReconstructSettings) -> Reconstr
     return reconstruct(known.trial, known.static if static else None, settings=chosen)
 
 
-def off(known: Planted, made: Reconstruction) -> PlantedError:
-    """How far the result is from the truth."""
-    return planted_error(known, made.motion)
-
-
 def truth_table() -> list[str]:
     """One row per clip, set and static trial or none."""
     lines = [
@@ -71,10 +62,8 @@ def truth_table() -> list[str]:
         "with its filters. Angles: the whole angle between found and true joint rotation, all axes at once, root mean "
         "square over frames and joints, each segment's constant offset over the clip taken off (target 2); raw: with "
         "it. Centres: hips, knees, ankles, shoulders, elbows, wrists, in the world (target 10 mm).", "",
-        *markdown.head([
-            "clip", "markers", "static", "angles deg", "raw deg", "centres mm", "p95 mm",
-            "residual mm", "one segment mm", "worst angle", "worst centre",
-        ]),
+        *effort.format_head(["clip", "markers", "static", "angles deg", "raw deg", "centres mm", "p95 mm",
+                             "residual mm", "one segment mm", "worst angle", "worst centre"]),
     ]  # fmt: skip
     for name, marker_set in TRIED:
         known = planted(clip(name), marker_set, seed=1, occlusion=_OCCLUDED)
@@ -85,15 +74,14 @@ def truth_table() -> list[str]:
 
 def bone_table() -> list[str]:
     """The same without skin and noise: what the road itself leaves."""
-    lines = markdown.head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
+    lines = effort.format_head(["clip", "markers", "angles deg", "raw deg", "centres mm", "residual mm"])
     for name, marker_set in ON_BONE:
         known = planted(clip(name), marker_set, seed=1, softness=0.0, noise=0.0)
         made = again(known, True, settings(marker_set))
-        error = off(known, made)
-        lines.append(markdown.row([
-            name, marker_set, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
-            f"{1e3 * error.centre:.1f}", _rms_mm(made.solved.residual),
-        ]))  # fmt: skip
+        error = planted_error(known, made.motion)
+        lines.append(effort.format_row([name, marker_set, f"{np.degrees(error.angle):.2f}",
+                                        f"{np.degrees(error.raw_angle):.2f}", f"{1e3 * error.centre:.1f}",
+                                        _rms_mm(made.solved.residual)]))
     return lines
 
 
@@ -101,16 +89,14 @@ def _truth_row(name: str, marker_set: str, static: bool, known: Planted) -> str:
     begin = [name, marker_set, "yes" if static else "no"]
     try:
         made = again(known, static, settings(marker_set))
-        error = off(known, made)
+        error = planted_error(known, made.motion)
     except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
-        return markdown.row([*begin, f"failed: {problem}"[:160], *[""] * 7])
+        return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 7])
     solved = made.solved
-    return markdown.row([
-        *begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}", f"{1e3 * error.centre:.1f}",
-        f"{1e3 * error.worst_centre:.1f}",
-        _rms_mm(solved.residual), _rms_mm(solved.single), _worst(error.angles, np.degrees(1.0), 1),
-        _worst(error.centres, 1e3, 0),
-    ])  # fmt: skip
+    return effort.format_row([*begin, f"{np.degrees(error.angle):.2f}", f"{np.degrees(error.raw_angle):.2f}",
+                              f"{1e3 * error.centre:.1f}", f"{1e3 * error.worst_centre:.1f}", _rms_mm(solved.residual),
+                              _rms_mm(solved.single), _worst(error.angles, np.degrees(1.0), 1),
+                              _worst(error.centres, 1e3, 0)])
 
 
 def _rms_mm(values: np.ndarray) -> str:
@@ -124,7 +110,7 @@ def _worst(of: dict[str, float], scale: float, digits: int) -> str:
 
 def filter_table() -> list[str]:
     """The same planted throw and walk by each filter."""
-    lines = markdown.head(
+    lines = effort.format_head(
         ["clip", "filter", "angles deg", "centres mm", "fastest hand m/s", "true", "hand's acceleration off"]
     )
     for name, noise in (("walk", 5e-4), ("throw", 5e-4), ("throw", 2e-3)):
@@ -132,11 +118,10 @@ def filter_table() -> list[str]:
         known = planted(clip(name), marker_set, seed=2, noise=noise)
         for chosen in ("none", "butterworth", "kalman"):
             made = again(known, True, settings(marker_set, filter=chosen, plant=False))
-            error, (found, true, accelerated) = off(known, made), _hand(known, made.motion)
-            lines.append(markdown.row([
-                f"{name}, noise {1e3 * noise:g} mm", chosen, f"{np.degrees(error.angle):.2f}",
-                f"{1e3 * error.centre:.1f}", f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2",
-            ]))  # fmt: skip
+            error, (found, true, accelerated) = planted_error(known, made.motion), _hand(known, made.motion)
+            lines.append(effort.format_row([f"{name}, noise {1e3 * noise:g} mm", chosen,
+                                            f"{np.degrees(error.angle):.2f}", f"{1e3 * error.centre:.1f}",
+                                            f"{found:.2f}", f"{true:.2f}", f"{accelerated:.1f} m/s^2"]))
     return lines
 
 
@@ -158,10 +143,8 @@ def fault_table() -> list[str]:
         "Hidden: share of the samples that are hidden; filled: of the hidden ones that have a place again, how far "
         "they are from where the marker was. Mended: planted faults after which the samples are right; false: what is "
         "told of where nothing was planted; off afterwards: how far all samples are from the truth.", "",
-        *markdown.head([
-            "clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps mended", "jumps mended", "unlabeled back",
-            "false swaps, jumps", "off afterwards mm p99", "frames/s",
-        ]),
+        *effort.format_head(["clip", "markers", "hidden", "filled", "off mm rms, p95", "swaps mended", "jumps mended",
+                             "unlabeled back", "false swaps, jumps", "off afterwards mm p99", "frames/s"]),
     ]  # fmt: skip
     for name, marker_set in SPOILED:
         for share in (0.05, 0.2):
@@ -183,7 +166,7 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
     hidden = ~np.isfinite(before[..., 0])
     filled = hidden & np.isfinite(apart)
     gone = 1e3 * apart[filled]
-    return markdown.row([
+    return effort.format_row([
         name, marker_set, f"{100 * hidden.mean():.0f} %", f"{100 * filled.sum() / max(hidden.sum(), 1):.0f} %",
         f"{np.sqrt(np.mean(gone**2)):.1f}, {np.percentile(gone, 95):.1f}" if len(gone) else "",
         *(_mended(known, names, apart, kind) for kind in ("swap", "jump", "unlabeled")), _false(known, cleaned.report),
@@ -219,15 +202,13 @@ def speed_table() -> list[str]:
     """Frames a second of the pose alone, on one core."""
     from beyond_mocap.markers.pose.pose import solve
 
-    lines = markdown.head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
+    lines = effort.format_head(["clip", "markers", "joints", "frames", "frames a second (target 200)", "weights off"])
     for name, marker_set in TIMED:
         known = planted(clip(name), marker_set, seed=3, occlusion=_OCCLUDED)
         made = again(known, True, settings(marker_set))
         rates = [_rate(made, solve, weights) for weights in (True, False)]
-        lines.append(markdown.row([
-            name, f"{marker_set}, {len(made.model.markers)}", str(len(made.model.skeleton)), str(len(made.trial)),
-            *(f"{rate:.0f}" for rate in rates),
-        ]))  # fmt: skip
+        lines.append(effort.format_row([name, f"{marker_set}, {len(made.model.markers)}", str(len(made.model.skeleton)),
+                                        str(len(made.trial)), *(f"{rate:.0f}" for rate in rates)]))
     return lines
 
 

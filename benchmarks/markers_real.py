@@ -1,4 +1,4 @@
-"""Real trials through the whole recipe: how near the markers are, beside fitting every segment alone."""
+"""Real trials through the whole recipe; planted throws whose release is known, and pitches whose speed a radar took."""
 
 from __future__ import annotations
 
@@ -8,21 +8,29 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks import markdown
+from benchmarks import effort
 from benchmarks.places import DATA
 from beyond_mocap.markers.files.marker_files import read_markers
+from beyond_mocap.markers.files.marker_set_text import chosen_set
 from beyond_mocap.markers.reconstruct import Reconstruction, ReconstructSettings, reconstruct
+from beyond_mocap.markers.release.release import ReleaseSettings, release
 from beyond_mocap.motion import quaternion
+from beyond_mocap.synthetic.ground_truth.planted_ball import PlantedBall
+from beyond_mocap.synthetic.ground_truth.planted_markers import Planted, planted
+from beyond_mocap.synthetic.throws import throw
 
-TRIALS = (
-    ("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None), ("kinematics_tennis_serve.c3d", None),
-    ("kinematics_tennis_serve_nan.c3d", None), ("sprinter_run0350cms.trc", "sprinter_static.trc"),
-    ("sprinter_run0350cms.trc", None), ("sprinter_run0900cms.trc", "sprinter_static.trc"),
-    ("PiG_Motion3_FF.c3d", "PiG_Calibration3_FF.c3d"), ("PiG_Motion3_FF.c3d", None),
-    ("whole_body_stick_puck.c3d", None),
-)
+TRIALS = (("000870_003252_74_195_002_FF_808.c3d", None), ("pitch_biodata.c3d", None),
+          ("kinematics_tennis_serve.c3d", None), ("kinematics_tennis_serve_nan.c3d", None),
+          ("sprinter_run0350cms.trc", "sprinter_static.trc"), ("sprinter_run0350cms.trc", None),
+          ("sprinter_run0900cms.trc", "sprinter_static.trc"), ("PiG_Motion3_FF.c3d", "PiG_Calibration3_FF.c3d"),
+          ("PiG_Motion3_FF.c3d", None), ("whole_body_stick_puck.c3d", None))
 """Trial and static trial."""
 FOLDER = DATA / "markers"
+
+THROWS = ((18.0, 30.0, "right", "overarm", 240.0, 15.0), (18.0, 36.0, "right", "overarm", 360.0, 25.0),
+          (12.0, 18.0, "left", "overarm", 200.0, 8.0), (10.0, 22.0, "right", "sidearm", 200.0, 0.0))
+"""Metres to the target, m/s, arm, style, frames a second, revolutions a second."""
+PITCHES = ("000870_003252_74_195_002_FF_808.c3d", "pitch_biodata.c3d")
 
 
 @lru_cache(maxsize=None)
@@ -34,21 +42,14 @@ def timed(trial: str, static: str | None) -> tuple[Reconstruction, float]:
     return reconstruct(seen, still, settings=ReconstructSettings()), time.process_time() - begun
 
 
-def made(trial: str, static: str | None) -> Reconstruction:
-    """A trial's reconstruction."""
-    return timed(trial, static)[0]
-
-
 def trial_table() -> list[str]:
     """One row per trial."""
     lines = [
         "Residual: model marker against seen one, of the pose; one segment: every cluster of at least three markers "
         "fitted alone, which knows no joints and no limits; written: of the motion after its filters.", "",
-        *markdown.head([
-            "trial", "static", "set, markers, joints", "residual mm rms, p95", "one segment mm rms", "written mm rms",
-            "bones change", "standing feet cm/s, mm", "at a limit", "fastest turn deg/frame", "seconds",
-            "worst markers mm",
-        ]),
+        *effort.format_head(["trial", "static", "set, markers, joints", "residual mm rms, p95", "one segment mm rms",
+                             "written mm rms", "bones change", "standing feet cm/s, mm", "at a limit",
+                             "fastest turn deg/frame", "seconds", "worst markers mm"]),
     ]  # fmt: skip
     return lines + [_row(trial, static) for trial, static in TRIALS]
 
@@ -59,20 +60,17 @@ def _row(trial: str, static: str | None) -> str:
         out, took = timed(trial, static)
         figures = out.report()
     except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
-        return markdown.row([*begin, f"failed: {problem}"[:160], *[""] * 9])
+        return effort.format_row([*begin, f"failed: {problem}"[:160], *[""] * 9])
     near, slide = figures["residual_mm"], figures["skate"]
     worst = sorted(((far, label) for label, far in near["per_marker"].items() if far), reverse=True)[:4]
     limits = sorted(((share, joint) for joint, share in figures["limits"].items() if share > 0.05), reverse=True)[:3]
     slides = slide is not None and slide["contact_cm_s"] is not None
     feet = f"{slide['contact_cm_s']:.1f}, {slide['stance_mm_median'] or 0:.0f}" if slides else ""
-    return markdown.row([
-        *begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
-        f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}", f"{near['output_rms']:.1f}",
-        f"{figures['bones_change_m']:.0e} m", feet,
-        ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits),
-        _fastest(out), f"{took:.1f}",
-        ", ".join(f"{label} {far:.0f}" for far, label in worst),
-    ])  # fmt: skip
+    return effort.format_row([*begin, f"{figures['marker_set']}, {figures['markers']}, {figures['joints']}",
+                              f"{near['rms']:.1f}, {near['p95']:.1f}", f"{near['single_rms']:.1f}",
+                              f"{near['output_rms']:.1f}", f"{figures['bones_change_m']:.0e} m", feet,
+                              ", ".join(f"{joint} {100 * share:.0f} %" for share, joint in limits), _fastest(out),
+                              f"{took:.1f}", ", ".join(f"{label} {far:.0f}" for far, label in worst)])
 
 
 def _fastest(out: Reconstruction) -> str:
@@ -83,3 +81,58 @@ def _fastest(out: Reconstruction) -> str:
     )
     frame, joint = np.unravel_index(int(np.argmax(steps)), steps.shape)
     return f"{out.solved.motion.skeleton.names[joint]} {np.degrees(steps[frame, joint]):.0f} at {frame}"
+
+
+def planted_table() -> list[str]:
+    """Each planted throw with its ball's marker seen in flight, seen late, and with none."""
+    lines = effort.format_head(["throw", "ball's marker", "true m/s", "found m/s", "off", "time off ms, frames",
+                                "way off deg", "told sigma ms, m/s"])
+    for distance, speed, arm, style, fps, turns in THROWS:
+        thrown = throw((distance, 0.0, 1.0), speed, arm, style, fps=fps)
+        ball = PlantedBall(thrown.release, side=arm.title(), turns=turns)
+        known = planted(thrown.motion, "driveline", seed=7, ball=ball)
+        chosen = ReconstructSettings(marker_set=chosen_set("driveline"), release="no")
+        motion = reconstruct(known.trial, known.static, settings=chosen).motion
+        name = f"{speed:g} m/s {arm} {style}, {fps:g} Hz"
+        for how, trial in _ways(known):
+            lines.append(_release_row(name, how, known, trial, motion))
+    return lines
+
+
+def _ways(known: Planted):
+    """The trial with all of the ball's marker, with it hidden for 40 ms around release, and without it."""
+    label = known.ball.asked.label
+    index = known.trial.index(label)
+    frames = np.abs(np.arange(len(known.trial)) / known.trial.fps - known.ball.asked.release) < 0.04
+    hidden = known.trial.positions.copy()
+    hidden[frames, index] = np.nan
+    yield "seen", known.trial
+    yield "hidden 80 ms around", known.trial.with_positions(hidden)
+    yield "none", known.trial.only([other for other in known.trial.labels if other != label])
+
+
+def _release_row(name: str, how: str, known: Planted, trial, motion) -> str:
+    truth, fps = known.ball, known.trial.fps
+    try:
+        found = release(trial, motion, ReleaseSettings(ball_marker="" if how == "none" else None))
+    except Exception as problem:  # noqa: BLE001 a table tells what failed and goes on
+        return effort.format_row([name, how, f"{truth.speed:.1f}", f"failed: {problem}"[:120], *[""] * 4])
+    late = found.time - truth.asked.release
+    way = np.degrees(np.arccos(np.clip(found.direction @ truth.velocity / truth.speed, -1.0, 1.0)))
+    return effort.format_row([name, f"{how} ({found.how})", f"{truth.speed:.1f}", f"{found.speed:.1f}",
+                              f"{100 * (found.speed / truth.speed - 1):+.1f} %",
+                              f"{1e3 * late:+.1f}, {late * fps:+.1f}", f"{way:.1f}",
+                              f"{1e3 * found.time_sigma:.1f}, {found.speed_sigma:.1f}"])
+
+
+def radar_table() -> list[str]:
+    """Pitches without a marker on the ball."""
+    lines = effort.format_head(["pitch", "found m/s", "radar m/s", "off", "told sigma m/s", "release s"])
+    for trial in PITCHES:
+        body, _ = timed(trial, None)
+        found = release(body.raw, body.motion)
+        radar = found.radar
+        lines.append(effort.format_row([trial, f"{found.speed:.1f}", "not told" if radar is None else f"{radar:.1f}",
+                                        "" if radar is None else f"{100 * (found.speed / radar - 1):+.1f} %",
+                                        f"{found.speed_sigma:.1f}", f"{found.time:.3f}"]))
+    return lines

@@ -1,7 +1,8 @@
 """Recordings of many kinds on many paths.
 
-Each recording's first ten seconds ride every path of `path_shapes`. A figure stands beside the recording's own, and
-beside the same ride without planting where that says something.
+Each recording's first ten seconds ride every path of `ALL`: name -> places (N, 3) m, the first at the origin and
+setting out along +x. A figure stands beside the recording's own, and beside the same ride without planting where that
+says something.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks import markdown, path_shapes
+from benchmarks import effort
 from benchmarks.places import CMU_UNIT, DATA
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.files.bvh import bvh
@@ -23,18 +24,12 @@ from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
 
 SECONDS, BUDGET_FRAMES, BUDGET_MS = 10.0, 600, 35.0
 CLIPS = {
-    "cmu10": (
-        "10_04", "train_walking_1", "train_walking_2", "train_walking_3", "train_running_1", "test_running_1",
-    ),
-    "lafan1": (
-        "walk1_subject1_walk2_filtered", "walk3_subject4_walk2_filtered", "run2_subject4_run2_filtered",
-        "pushAndStumble1_subject2_jog_filtered", "multipleActions1_subject4_walk2_filtered",
-        "fightAndSports1_subject1_backward_filtered",
-    ),
-    "bandai": (
-        "dataset-1_walk_normal_001", "dataset-1_walk_proud_001", "dataset-1_run_normal_001",
-        "dataset-1_dash_normal_001", "dataset-1_walk-left_normal_001", "dataset-1_walk-back_normal_001",
-    ),
+    "cmu10": ("10_04", "train_walking_1", "train_walking_2", "train_walking_3", "train_running_1", "test_running_1"),
+    "lafan1": ("walk1_subject1_walk2_filtered", "walk3_subject4_walk2_filtered", "run2_subject4_run2_filtered",
+               "pushAndStumble1_subject2_jog_filtered", "multipleActions1_subject4_walk2_filtered",
+               "fightAndSports1_subject1_backward_filtered"),
+    "bandai": ("dataset-1_walk_normal_001", "dataset-1_walk_proud_001", "dataset-1_run_normal_001",
+               "dataset-1_dash_normal_001", "dataset-1_walk-left_normal_001", "dataset-1_walk-back_normal_001"),
     "runs15": ("sie_humanoid3d_run_forward04", "sie_humanoid3d_run_forward12", "sie_humanoid3d_run_left07"),
     "lmd": ("Player1/P1_S21_dribble_long", "Player1/P1_S27_dribble_straight", "Player1/P1_S01_penalty_kick"),
     "sprinter": ("run0350cms", "run0900cms"),
@@ -54,6 +49,78 @@ COLUMNS = {
 }
 
 
+STEP = 0.02  # metres between places
+
+
+def straight(length: float = 30.0) -> np.ndarray:
+    """A straight line."""
+    return np.column_stack([np.arange(0.0, length, STEP), *np.zeros((2, len(np.arange(0.0, length, STEP))))])
+
+
+def circle(radius: float, rounds: float = 1.0) -> np.ndarray:
+    """A circle to the left."""
+    return bent(lambda s: np.full_like(s, 1.0 / radius), 2.0 * np.pi * radius * rounds)
+
+
+def bent(curvature, length: float) -> np.ndarray:
+    """The line whose curvature, 1/m to the left, is curvature(s (N,) m)."""
+    s = np.arange(0.0, length, STEP)
+    bend = curvature(s)
+    heading = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (bend[1:] + bend[:-1]))])
+    middle = 0.5 * (heading[1:] + heading[:-1])
+    steps = STEP * np.column_stack([np.cos(middle), np.sin(middle)])
+    return np.column_stack([np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)]), np.zeros(len(s))])
+
+
+def winding(radius: float = 2.5, wave: float = 9.0, length: float = 30.0) -> np.ndarray:
+    """An S after the other; `radius` m where it bends most."""
+    return bent(lambda s: np.sin(2.0 * np.pi * s / wave) / radius, length)
+
+
+def zigzag(leg: float = 3.0, angle: float = 60.0, legs: int = 10) -> np.ndarray:
+    """Straight legs that turn by `angle` degrees to and fro: the corners alone."""
+    way = np.radians(angle) * (np.arange(legs) % 2)
+    steps = leg * np.column_stack([np.cos(way), np.sin(way), np.zeros(legs)])
+    return np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+
+
+def eight(size: float = 3.5, rounds: float = 1.5) -> np.ndarray:
+    """A figure of eight (Gerono's), 2 `size` m long."""
+    t = np.linspace(0.0, 2.0 * np.pi * rounds, 3000)
+    line = size * np.column_stack([np.sin(t), np.sin(t) * np.cos(t), np.zeros_like(t)])
+    return line @ _turned(-0.25 * np.pi)
+
+
+def walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.ndarray:
+    """A stroll of bends of all sizes, `tightest` m at least."""
+    rng = np.random.default_rng(seed)
+    waves, phases, size = rng.uniform(5.0, 16.0, 5), rng.uniform(0.0, 2.0 * np.pi, 5), rng.uniform(0.4, 1.0, 5)
+    s = np.arange(0.0, length, STEP)
+    bend = np.sum(size * np.sin(2.0 * np.pi * s[:, None] / waves + phases), axis=1)
+    return bent(lambda at: np.interp(at, s, bend / np.abs(bend).max() / tightest), length)
+
+
+def hill(degrees: float, way: float = 4.0, length: float = 30.0) -> np.ndarray:
+    """Up for `way` m over the ground, over the top and down again, and so on; slopes of `degrees` but for 1 m around
+    tops and valleys."""
+    line = straight(length)
+    slope = np.tan(np.radians(degrees)) * np.clip(np.sin(np.pi * line[:, 0] / way) * way / np.pi, -1.0, 1.0)
+    line[:, 2] = np.cumsum(slope) * STEP
+    return line
+
+
+def _turned(angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+FAIR = {"straight": straight(), "circle 8 m": circle(8.0), "circle 3 m": circle(3.0, 2.0),
+        "circle 2 m": circle(2.0, 3.0), "winding": winding(), "walkabout": walkabout()}
+TIGHT = {"eight": eight(), "zigzag": zigzag(), "circle 1 m": circle(1.0, 5.0)}
+HILLS = {f"hill {degrees}": hill(degrees) for degrees in (5, 10, 15)}
+ALL = {**FAIR, **TIGHT, **HILLS}
+
+
 @dataclass(frozen=True)
 class Row:
     """One ride: of which kind and recording, on which path, its figures by dotted name, ms of `ride`."""
@@ -65,7 +132,7 @@ class Row:
     ms: float
 
 
-def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(path_shapes.ALL), **settings) -> list[Row]:
+def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), **settings) -> list[Row]:
     """A row for each recording of `kinds` on each of `paths`. settings: of RideSettings."""
     chosen, rows = RideSettings(**settings), []
     for kind in kinds:
@@ -83,7 +150,7 @@ def recording(kind: str, name: str):
 
 
 def _row(kind: str, name: str, shape: str, source, settings: RideSettings) -> Row:
-    path = through(path_shapes.ALL[shape], shape)
+    path = through(ALL[shape], shape)
     begun = time.process_time()
     ridden = ride(source, path, settings)
     took = 1e3 * (time.process_time() - begun)
@@ -102,10 +169,10 @@ def dotted(value, name: str = "") -> dict[str, float]:
 def table(rows: list[Row], by: str) -> list[str]:
     """Medians over the rides of each `by` (kind or path), a line each."""
     names = list(dict.fromkeys(getattr(row, by) for row in rows))
-    lines = markdown.head([by, "rides", *COLUMNS])
+    lines = effort.format_head([by, "rides", *COLUMNS])
     for name in names:
         group = [row for row in rows if getattr(row, by) == name]
-        lines.append(markdown.row([name, str(len(group)), *(_cell(group, of) for of in COLUMNS.values())]))
+        lines.append(effort.format_row([name, str(len(group)), *(_cell(group, of) for of in COLUMNS.values())]))
     return lines
 
 
@@ -164,7 +231,7 @@ def _value(of, row: Row) -> float:
 
 def kept(rows: list[Row]) -> str:
     """How many fair rides skate no more than their recording, and keep the speed."""
-    fair = [row for row in rows if row.path in path_shapes.FAIR]
+    fair = [row for row in rows if row.path in FAIR]
     if not fair:
         return "no ride on a fair path"
     pairs = [(row.values.get("skate.contact_cm_s"), row.values.get("skate.source_contact_cm_s")) for row in fair]
@@ -183,7 +250,7 @@ def timing() -> str:
     """ms of `prepare` and `ride` for 600 frames at 60 per second, the best of seven."""
     motion = recording("lafan1", "walk1_subject1_walk2_filtered")
     motion = resample(motion, 60.0).frames(0, BUDGET_FRAMES)
-    settings, path = RideSettings(), through(path_shapes.winding(), "winding")
+    settings, path = RideSettings(), through(winding(), "winding")
     took = {"prepare": np.inf, "ride": np.inf, "ride without planting": np.inf}
     for _ in range(7):
         begun = time.process_time()
@@ -219,13 +286,9 @@ def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
     return [*lines, ""]
 
 
-def section(
-    kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(path_shapes.ALL), count: int = 3
-) -> list[str]:
+def section(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL), count: int = 3) -> list[str]:
     """The lines of a report: what is kept, by path, by recordings, the worst `count`, cycling."""
     rows = rides(kinds, paths)
-    return [
-        kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
-        "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
-        *cycled(kinds),
-    ]  # fmt: skip
+    return [kept(rows), "", timing(), "", *table(rows, "path"), "", *table(rows, "kind"), "",
+            "Medians; `before` is without planting, `own` the recording's. The worst:", "", *worst(rows, count), "",
+            *cycled(kinds)]

@@ -1,23 +1,39 @@
-"""The five scenarios with two libraries: time, every figure of method `path` beside its target, and edits."""
+"""The five scenarios with two libraries: time, every figure of method `path` beside its target, and edits.
+
+The edits are those of ../shared/metrics.md, "edit time": every key moment by 0.2 s, earlier and later, and the track
+dragged by half a metre at a quarter, half and three quarters of its time, within a second and a half to either side:
+processor's seconds from a changed plan to the new take, how much of it is new, and what shows at its ends.
+"""
 
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks import effort, markdown
-from benchmarks.edit_time import edit_times
+from benchmarks import effort
 from benchmarks.places import LIBRARIES, library_folder, scenario
+from beyond_mocap.annotation import Timeline
+from beyond_mocap.base.easing import smoothstep
 from beyond_mocap.evaluation.report import evaluate, judge_figures
 from beyond_mocap.library.build import build
 from beyond_mocap.library.library import Library
+from beyond_mocap.motion.humanoid import identify
+from beyond_mocap.motion.motion import forward_kinematics
+from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
+from beyond_mocap.synthesis.resynthesize import resynthesize
 from beyond_mocap.synthesis.synthesize import synthesize
+from beyond_mocap.synthesis.take import Take
 
 NUMBERS = (1, 2, 3, 4, 5)
+
+LATER, ASIDE, WIDTH = 0.2, 0.5, 1.5
+TARGET = 0.3
 
 
 def section() -> list[str]:
@@ -29,19 +45,17 @@ def section() -> list[str]:
     return lines
 
 
-def of_library(name: str, place: Path, numbers: Sequence[int] = NUMBERS) -> list[str]:
+def of_library(name: str, place: Path) -> list[str]:
     """One library, its cache kept in `place`."""
     folder, unit, cache = library_folder(name, place), LIBRARIES[name], place / "cache"
     cold, _ = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache, rebuild=True), 1)
     warm, library = effort.seconds(lambda: build(folder, unit=unit, cache_dir=cache))
-    reports = {number: report_of(library, number) for number in numbers}
+    reports = {number: report_of(library, number) for number in NUMBERS}
     took = [20.0 * report["seconds"]["total"] / report["duration_s"] for report in reports.values()]
-    orders = [(f"scenario {number}", *scenario(number)) for number in numbers]
-    return [
-        f"### Library {name}", "", f"- library: {cold:.2f} s from text, {warm:.2f} s from its cache",
-        f"- {np.mean(took):.2f} s for 20 s of motion (target 0.5), {max(took):.2f} at most",
-        f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "", *edit_times(library, orders), "",
-    ]  # fmt: skip
+    return [f"### Library {name}", "", f"- library: {cold:.2f} s from text, {warm:.2f} s from its cache",
+            f"- {np.mean(took):.2f} s for 20 s of motion (target 0.5), {max(took):.2f} at most",
+            f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "",
+            *edit_times(library, map(scenario, NUMBERS)), ""]
 
 
 def report_of(library: Library, number: int) -> dict:
@@ -56,12 +70,95 @@ def report_of(library: Library, number: int) -> dict:
 def figures(reports: Mapping[int, Mapping]) -> list[str]:
     """A row for each figure with a target: its value in every scenario, the recordings' own, in how many it is met."""
     rows = {number: {row.name: row for row in judge_figures(report)} for number, report in reports.items()}
-    lines = markdown.head(["figure", "target", *(f"scenario {number}" for number in rows), "recordings", "met in"])
+    lines = effort.format_head(["figure", "target", *(f"scenario {number}" for number in rows), "recordings", "met in"])
     for name in dict.fromkeys(row.name for of in rows.values() for row in of.values() if row.status):
         found = [of.get(name) for of in rows.values()]
         known = [row for row in found if row is not None and row.status]
         met = sum(row.status == "met" for row in known)
         verdict = f"{met} of {len(known)}" if met == len(known) else f"**{met} of {len(known)}**"
         values = ["" if row is None else str(row.value) for row in found]
-        lines.append(markdown.row([name, known[0].target, *values, str(known[0].own), verdict]))
+        lines.append(effort.format_row([name, known[0].target, *values, str(known[0].own), verdict]))
     return lines
+
+
+def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs: int = 3) -> list[str]:
+    """Markdown lines: a row per kind of edit, over all orders (track, timeline); seconds are the best of
+    `runs`."""
+    figures: dict[str, list[tuple[float, ...]]] = {}
+    for track, timeline in orders:
+        before = synthesize(library, Plan(track=track, timeline=timeline, nearest=True))
+        for kind, plan in _edits(before.plan):
+            best, after = _timed(library, plan, before, runs)
+            anew = np.flatnonzero(_changed(before, after))
+            if len(anew):
+                figures.setdefault(kind, []).append((best, len(anew) / after.motion.fps, *_ends(before, after, anew)))
+    return [
+        f"| edit | n | median s | 95 % s | within {TARGET:g} s | made anew, median s | "
+        "jerk at its ends, before -> after | feet slide there, before -> after |",
+        "|---" * 8 + "|",
+        *(_row(kind, np.array(found)) for kind, found in figures.items()),
+    ]
+
+
+def _row(kind: str, found: np.ndarray) -> str:
+    seconds, anew, jerk, jerk_after, slide, slide_after = found.T
+    return (
+        f"| {kind} | {len(found)} | {np.median(seconds):.2f} | {np.percentile(seconds, 95):.2f} | "
+        f"{np.mean(seconds <= TARGET):.0%} | "
+        f"{np.median(anew):.1f} | {np.nanmedian(jerk):.0f} -> {np.nanmedian(jerk_after):.0f} m/s^3 | "
+        f"{np.nanmean(slide):.1f} -> {np.nanmean(slide_after):.1f} cm/s |"
+    )
+
+
+def _edits(plan: Plan) -> Iterator[tuple[str, Plan]]:
+    keys, times = plan.timeline.keys, plan.track.times
+    for number, key in enumerate(keys):
+        for moved in (key.time - LATER, key.time + LATER):
+            if times[0] < moved < times[-1]:
+                others = (*keys[:number], replace(key, time=moved), *keys[number + 1 :])
+                yield "key moment moved by 0.2 s", replace(plan, timeline=replace(plan.timeline, keys=others))
+    for share in (0.25, 0.5, 0.75):
+        at = times[0] + share * (times[-1] - times[0])
+        yield "track dragged by 0.5 m", replace(plan, track=dragged(plan.track, at))
+
+
+def dragged(track: Track, at: float, aside: Sequence[float] = (0.0, ASIDE), width: float = WIDTH) -> Track:
+    """The track with a smooth bump of `aside` (2,) m around second `at`, `width` s to each side."""
+    bump = smoothstep(1.0 - np.abs(track.times - at) / width)[:, None] * np.asarray(aside)
+    return replace(track, positions=track.positions + bump)
+
+
+def _timed(library: Library, plan: Plan, before: Take, runs: int) -> tuple[float, Take]:
+    best, after = np.inf, before
+    for _ in range(runs):
+        begun = time.process_time()
+        after = resynthesize(library, plan, before)
+        best = min(best, time.process_time() - begun)
+    return best, after
+
+
+def _changed(before: Take, after: Take) -> np.ndarray:
+    """(T,) bool: frames of which any bit is another."""
+    a, b = before.motion, after.motion
+    return np.any(a.root_positions != b.root_positions, axis=1) | np.any(a.rotations != b.rotations, axis=(1, 2))
+
+
+def _ends(before: Take, after: Take, anew: np.ndarray) -> tuple[float, ...]:
+    """Largest jerk of any joint, m/s^3, and mean speed of standing toes, cm/s, before and after, within the half second
+    in which old and new meet; NaN where the whole take is new."""
+    count, hand = len(after.motion), int(0.5 * after.motion.fps)
+    starts = [anew[0]] * (anew[0] > 0) + [anew[-1] - hand] * (anew[-1] + 1 < count)
+    frames = np.unique(np.clip([np.arange(start - 3, start + hand + 3) for start in starts], 0, count - 4))
+    return tuple(value for pair in zip(_shown(before, frames), _shown(after, frames)) for value in pair)
+
+
+def _shown(take: Take, frames: np.ndarray) -> tuple[float, float]:
+    if not len(frames):
+        return np.nan, np.nan
+    places, _ = forward_kinematics(take.motion)
+    jerk = np.linalg.norm(np.diff(places, 3, axis=0), axis=2).max(axis=1) * take.motion.fps**3
+    body = identify(take.motion.skeleton)
+    toes = places[:, [body.left.toe_or_foot, body.right.toe_or_foot], :2]
+    speed = 100.0 * np.linalg.norm(np.diff(toes, axis=0), axis=2) * take.motion.fps
+    still = (take.contacts[1:] & take.contacts[:-1])[frames]
+    return float(jerk[frames].max()), float(speed[frames][still].mean()) if still.any() else np.nan

@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks import effort, markdown
+from benchmarks import effort
 from beyond_mocap.base.errors import BeyondMocapError
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthetic.throws import throw
@@ -26,10 +26,8 @@ from beyond_mocap.throws.throw_order import Order
 
 UNSEEN, EACH = (901, 902, 903), 3
 """Seeds of made people whom no shipped weights saw, and movements of each."""
-TARGETS = {
-    "throw": ((6.0, 0.0, 1.2), (12.0, 4.0, 0.4), (12.0, -4.0, 2.2), (18.0, 0.0, 1.0), (24.0, 6.0, 1.5)),
-    "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8)),
-}
+TARGETS = {"throw": ((6.0, 0.0, 1.2), (12.0, 4.0, 0.4), (12.0, -4.0, 2.2), (18.0, 0.0, 1.0), (24.0, 6.0, 1.5)),
+           "kick": ((11.0, 0.0, 0.5), (11.0, 3.4, 2.2), (11.0, -3.4, 0.4), (16.0, 2.0, 1.2), (20.0, -3.0, 1.8))}
 """m, the thrower or the ball at the origin; (x, y) is turned by any angle."""
 FRAMES = 90
 SIZES = (("hierarchy", 4, 3, 96), ("hierarchy", 4, 3, 128), ("hierarchy", 4, 3, 256), ("hierarchy", 1, 8, 256),
@@ -67,13 +65,12 @@ def unseen(action: str, fps: float) -> tuple:
 
 def unseen_table(model, action: str) -> list[str]:
     """What the model makes of movements that it never saw, scaled by height."""
-    lines = markdown.head([
-        f"{len(UNSEEN)} unseen people, {EACH} each", "left hand, right hand, left foot, right foot, cm",
-        "networks alone, cm", "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits",
-    ])  # fmt: skip
+    lines = effort.format_head([f"{len(UNSEEN)} unseen people, {EACH} each",
+                                "left hand, right hand, left foot, right foot, cm", "networks alone, cm",
+                                "ball off at 4 m, m", "head off, °", "head turns", "jerk", "beyond limits"])
     for words, options in (("networks alone (target 3 cm)", RAW), ("corrected", FULL)):
         report = evaluate_throws(model, unseen(action, model.settings.fps), options).report()
-        lines.append(markdown.row([
+        lines.append(effort.format_row([
             words, _centimetres(report["deviation_m"]), _centimetres(report["network_deviation_m"]),
             *(_number(report[name], form) for name, form in (("impact_m", ".2f"), ("head", ".1f"),
                                                              ("head_share", ".2f"),
@@ -84,7 +81,7 @@ def unseen_table(model, action: str) -> list[str]:
 
 def target_table(model, action: str) -> list[str]:
     """Targets that nobody aimed at, after the last correction."""
-    lines = markdown.head(
+    lines = effort.format_head(
         ["target, m", "ball off, m (0.10)", "moved, cm (5)", "turned, °", "m/s", "raw, cm (3)", "seconds"]
     )
     for number, target in enumerate(TARGETS[action]):
@@ -94,14 +91,12 @@ def target_table(model, action: str) -> list[str]:
         try:
             took, thrown = effort.seconds(lambda order=order: throw_at(model, order))
         except BeyondMocapError as error:
-            lines.append(markdown.row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
+            lines.append(effort.format_row([_place(target), f"refused: {error}"[:110], *[""] * 5]))
             continue
-        lines.append(markdown.row([
-            _place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
-            f"{np.degrees(thrown.turned):.1f}",
-            f"{thrown.speed:.1f}", f"{100 * thrown.raw_deviation:.1f}",
-            f"{took:.2f} for {thrown.motion.duration:.1f}",
-        ]))  # fmt: skip
+        lines.append(effort.format_row([_place(target), f"{thrown.impact_error:.3f}", f"{100 * thrown.moved:.1f}",
+                                        f"{np.degrees(thrown.turned):.1f}", f"{thrown.speed:.1f}",
+                                        f"{100 * thrown.raw_deviation:.1f}",
+                                        f"{took:.2f} for {thrown.motion.duration:.1f}"]))
     return lines
 
 
@@ -132,7 +127,7 @@ def networks_row(kind: str, points: int, layers: int, units: int) -> str:
 
     spent, _ = effort.seconds(all_frames, _RUNS)
     count = sum(network.parameters for network in made)
-    return markdown.row(
+    return effort.format_row(
         [kind, str(points), str(layers), str(units), f"{count / 1e6:.2f}", f"{2 * count / 1e6:.1f}", f"{spent:.3f}"]
     )
 
@@ -156,16 +151,14 @@ def throw_rows(model: ThrowModel, name: str) -> list[str]:
                           ("start pose, inverse kinematics, limits", Options())):  # fmt: skip
         generate(model, description, options=options)
         spent, done = effort.seconds(lambda options=options: generate(model, description, options=options), _RUNS)
-        rows.append(markdown.row([name, str(len(description)), what, str(done.iterations), f"{spent:.3f}"]))
+        rows.append(effort.format_row([name, str(len(description)), what, str(done.iterations), f"{spent:.3f}"]))
     return rows
 
 
 def speed_tables() -> list[str]:
     """What the networks alone cost, of several sizes, and a throw of three seconds with the shipped weights."""
-    lines = markdown.head((
-        "networks", "control points", "hidden layers", "units", "parameters, million", "MB as float16",
-        f"s for {FRAMES} frames (target 0.12)",
-    ))  # fmt: skip
+    lines = effort.format_head(("networks", "control points", "hidden layers", "units", "parameters, million",
+                                "MB as float16", f"s for {FRAMES} frames (target 0.12)"))
     lines += [networks_row(*size) for size in SIZES]
-    lines += ["", *markdown.head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
+    lines += ["", *effort.format_head(("weights", "frames", "corrected by", "start iterations", "s (target 0.2)"))]
     return lines + throw_rows(shipped_model("throw"), "throw.npz")

@@ -11,7 +11,7 @@ from bpy_extras.io_utils import ExportHelper
 from ..beyond_mocap.base.errors import InputError
 from ..beyond_mocap.files.whole import atomic_write
 from ..beyond_mocap.passes import scene_json
-from ..beyond_mocap.passes.sample_scenes import SAMPLES as SCENES
+from ..beyond_mocap.passes.scene_json import SAMPLES as SCENES
 from ..scene.core.measure import units_per_metre
 from ..scene.passes import hits_shown, make, order, shown
 from ..scene.passes.settings import SAMPLES

@@ -133,7 +133,7 @@ as little as it takes. Of two or more selected riders only those give way; other
 
     def do(self, context):
         from ..beyond_mocap.path_editing.apart import Limits
-        from ..beyond_mocap.path_editing.follower import Change
+        from ..beyond_mocap.path_editing.detour import Change
 
         bodies = meant(context)
         bodies = bodies if len(bodies) > 1 else riders_in(context.scene)

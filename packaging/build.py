@@ -1,4 +1,5 @@
-"""Build the extension's zips into build/extension: one per platform, packed and validated by Blender's own tool.
+"""Build the extension's zips into build/extension: one per platform, laid out from our code, the wheels and
+the complete manifest, packed and validated by Blender's own tool.
 
     .venv/bin/python packaging/build.py --platforms linux-x64 windows-x64
 """
@@ -10,11 +11,13 @@ import tomllib
 
 import bundle
 import lint
-import stage
 import wheels
 
 TOP = bundle.HERE.parent
 OUT = TOP / "build" / "extension"
+PARTS = ("__init__.py", "batch.py", "LICENSE", "README.md", "CHANGELOG.md", "beyond_mocap", "scene", "operators",
+         "panels")
+LEFT_OUT = shutil.ignore_patterns("__pycache__", "*.pyc")
 
 
 def main(argv=None):
@@ -44,13 +47,12 @@ def build(packages, platform):
 
 
 def lay_out(folder, packages, platform):
-    """Fill the staging folder."""
+    """Fill the staging folder that Blender's own tool packs."""
     names = wheels.gather(packages, platform, folder / "wheels")
-    stage.copy_parts(TOP, folder)
+    copy_parts(TOP, folder)
     text = (TOP / "blender_manifest.toml").read_text("utf-8")
-    (folder / "blender_manifest.toml").write_text(
-        stage.complete_manifest(text, packages, platform.name, names), "utf-8"
-    )
+    whole = complete_manifest(text, packages, platform.name, names)
+    (folder / "blender_manifest.toml").write_text(whole, "utf-8")
 
 
 def version():
@@ -63,10 +65,8 @@ def pack(folder, out):
     import bpy  # noqa: F401  (brings bl_pkg)
     from bl_pkg.bl_extension_cli import cli_extension_handler as extension_tool
 
-    for verb in (
-        ["validate", str(folder)],
-        ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"],
-    ):
+    for verb in (["validate", str(folder)],
+                 ["build", "--source-dir", str(folder), "--output-dir", str(out), "--split-platforms"]):
         if extension_tool(verb) != 0:
             sys.exit(f"Blender's own tool refused: {verb[0]} {folder}")
 
@@ -75,6 +75,36 @@ def complain(lines):
     """Stop with these lines, if there are any."""
     if lines:
         sys.exit("\n".join(lines))
+
+
+def copy_parts(source, folder):
+    """Copy what ships from the clone at `source` into `folder`; a text that is not written yet is passed over."""
+    for part in PARTS:
+        path = source / part
+        if path.is_dir():
+            shutil.copytree(path, folder / part, ignore=LEFT_OUT)
+        elif path.exists():
+            shutil.copyfile(path, folder / part)
+
+
+def complete_manifest(text, packages, platform, wheels):
+    """The committed manifest's text, with the platform, the wheels and a copyright line per bundled package."""
+    holders = [
+        f"{package.copyright} ({package.name} {package.bundled_version}, {package.license})" for package in packages
+    ]
+    own = next(line for line in text.splitlines() if line.startswith("copyright = "))
+    ours = own.removeprefix("copyright = [").removesuffix("]")
+    added = [f"copyright = {_list([ours, *map(_quoted, holders)])}", f"platforms = {_list([_quoted(platform)])}",
+             f"wheels = {_list(_quoted(f'./wheels/{name}') for name in wheels)}"]
+    return text.replace(own, "\n".join(added))
+
+
+def _quoted(value):
+    return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _list(items):
+    return "[\n" + "".join(f"  {item},\n" for item in items) + "]"
 
 
 if __name__ == "__main__":

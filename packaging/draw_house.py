@@ -18,10 +18,8 @@ from xml.sax.saxutils import escape
 from house import CORE, LAYERS, TOP, layer_of, room_graph
 
 PICTURE = TOP / "docs" / "pictures" / "architecture.svg"
-COLUMNS = {
-    "annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,
-    "evaluation": 3, "path_editing": 0, "passes": 1, "throws": 2, "markers": 3, "study": 4, "match": 5,
-}  # fmt: skip
+COLUMNS = {"annotation": 0, "synthetic": 1, "appearance": 5, "files": 0, "ball": 2, "library": 1, "synthesis": 1,
+           "evaluation": 3, "path_editing": 0, "passes": 1, "throws": 2, "markers": 3, "study": 4, "match": 5}
 """Where a room stands in its layer; rooms that are not named here go right across."""
 BLENDER = {"panels": "What is shown", "scene": "Data in Blender, the live watcher", "operators": "What buttons do"}
 _MARGIN, _STEP, _BOX, _RISE, _TALL = 36, 200, 180, 84, 56
@@ -49,11 +47,9 @@ def _draw_blender() -> list[str]:
     """What puts the core into Blender: a row of its own above the core."""
     lefts = [_MARGIN + column * _STEP for column in (0, 2, 4)]
     middle = _MARGIN + _TALL / 2 - 14
-    arrows = [
-        _draw_arrow([(lefts[0] + _BOX, middle), (lefts[1], middle)]),
-        _draw_arrow([(lefts[2], middle), (lefts[1] + _BOX, middle)]),
-        *(_draw_arrow([(left + _BOX / 2, middle), (left + _BOX / 2, _TOP - 30)]) for left in lefts[1:]),
-    ]
+    arrows = [_draw_arrow([(lefts[0] + _BOX, middle), (lefts[1], middle)]),
+              _draw_arrow([(lefts[2], middle), (lefts[1] + _BOX, middle)]),
+              *(_draw_arrow([(left + _BOX / 2, middle), (left + _BOX / 2, _TOP - 30)]) for left in lefts[1:])]
     boxes = zip(lefts, BLENDER.items())
     return arrows + [_draw_box(left, _MARGIN - 14, _BOX, text, name, "#fdebd0") for left, (name, text) in boxes]
 

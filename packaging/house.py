@@ -17,10 +17,8 @@ from typing import NamedTuple
 TOP = pathlib.Path(__file__).resolve().parents[1]
 CORE = "beyond_mocap"
 FEATURES = ("path_editing", "passes", "throws", "markers", "study")
-LAYERS = (
-    ("base",), ("motion",), ("annotation", "appearance"), ("synthetic",), ("files", "ball"), ("library",),
-    ("synthesis",), ("evaluation",), FEATURES, ("match",), ("cli",),
-)  # fmt: skip
+LAYERS = (("base",), ("motion",), ("annotation", "appearance"), ("synthetic",), ("files", "ball"), ("library",),
+          ("synthesis",), ("evaluation",), FEATURES, ("match",), ("cli",))
 """The rooms of the core from the ground up: a room imports rooms of lower layers only, never one beside it."""
 GROUND_TRUTH = "synthetic.ground_truth"
 """Recordings with known answers, made with the features that tests ask about them: above the features, below

@@ -18,14 +18,11 @@ def lint_stage(folder, packages, platform):
     manifest = tomllib.loads((folder / "blender_manifest.toml").read_text("utf-8"))
     listed = [path.removeprefix("./wheels/") for path in manifest["wheels"]]
     there = {path.name for path in (folder / "wheels").iterdir()}
-    return [
-        *(f"platform {name!r} is none of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
-        *(f"wheel {name} is listed but not there" for name in listed if name not in there),
-        *(f"wheel {name} is there but not listed" for name in sorted(there) if name not in listed),
-        *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
-        *_copyright(manifest, packages),
-        *_coverage(listed, packages, platform),
-    ]
+    return [*(f"platform {name!r} is none of Blender's" for name in manifest["platforms"] if name not in BLENDERS),
+            *(f"wheel {name} is listed but not there" for name in listed if name not in there),
+            *(f"wheel {name} is there but not listed" for name in sorted(there) if name not in listed),
+            *(f"licence {name!r} has no SPDX name" for name in manifest["license"] if not name.startswith("SPDX:")),
+            *_copyright(manifest, packages), *_coverage(listed, packages, platform)]
 
 
 def _copyright(manifest, packages):

@@ -1,17 +1,29 @@
-"""Fetch the wheels of the bundle, once per platform and Python, into a cache outside the clone."""
+"""Fetch the wheels of the bundle, once per platform and Python, into a cache outside the clone, and slim kloppy's.
 
+kloppy goes in without its weight: 213 MB of test recordings, and the HTTP client that only its downloads need. We read
+files that lie on disk. What stays is kloppy's code as released, its licence and its metadata; the metadata no longer
+asks for `fsspec[http]` (the aiohttp family), the version says that something was taken out, and RECORD lists what is
+really there.
+"""
+
+import base64
+import csv
+import hashlib
+import io
 import os
 import pathlib
 import shutil
 import subprocess
 import sys
 import tempfile
+import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
-import slim
 from bundle import plain, wheel
 
 CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "beyond-mocap" / "wheels"
+LEFT_OUT = ("kloppy/tests/",)
+STAMP = (2020, 1, 1, 0, 0, 0)  # the same wheel, bit for bit, whenever it is made
 
 
 def gather(packages, platform, folder):
@@ -22,7 +34,7 @@ def gather(packages, platform, folder):
     for source in sorted({path.name: path for paths in fetched for path in paths}.values()):
         package = next(p for p in packages if plain(p.name) == wheel(source.name).name)
         if package.slimmed:
-            slim.slim(source, folder, package)
+            slim(source, folder, package)
         else:
             shutil.copyfile(source, folder / source.name)
     return sorted(path.name for path in folder.iterdir())
@@ -55,3 +67,44 @@ def _download(pins, platform, python, folder):
         subprocess.run([*command, *pins], check=True)
         for path in pathlib.Path(fresh).glob("*.whl"):
             path.replace(folder / path.name)
+
+
+def slim(source, folder, package):
+    """Write the slimmed wheel of `source` (a path) into `folder` and return its path."""
+    old, new = (f"{package.name}-{version}" for version in (package.version, package.bundled_version))
+    target = folder / source.name.replace(old, new)
+    files = {name.replace(f"{old}.dist-info/", f"{new}.dist-info/"): text for name, text in _kept(source)}
+    metadata = f"{new}.dist-info/METADATA"
+    files[metadata] = _slim_metadata(files[metadata].decode("utf-8"), package).encode("utf-8")
+    record = f"{new}.dist-info/RECORD"
+    files[record] = _record(files, record)
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in files.items():
+            archive.writestr(zipfile.ZipInfo(name, STAMP), data, zipfile.ZIP_DEFLATED)
+    return target
+
+
+def _kept(source):
+    with zipfile.ZipFile(source) as archive:
+        for name in archive.namelist():
+            if not name.startswith(LEFT_OUT):
+                yield name, archive.read(name)
+
+
+def _slim_metadata(text, package):
+    """The same metadata with the marked version and fsspec without its "http" extra."""
+    head, gap, description = text.partition("\n\n")
+    lines = [line.replace("fsspec[http]", "fsspec") for line in head.splitlines()]
+    lines[lines.index(f"Version: {package.version}")] = f"Version: {package.bundled_version}"
+    return "\n".join(lines) + gap + description
+
+
+def _record(files, record):
+    out = io.StringIO()
+    rows = csv.writer(out, lineterminator="\n")
+    for name, data in files.items():
+        if name != record:
+            digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode("ascii")
+            rows.writerow([name, f"sha256={digest}", len(data)])
+    rows.writerow([record, "", ""])
+    return out.getvalue().encode("utf-8")

@@ -25,14 +25,8 @@ from beyond_mocap.motion.humanoid import heading  # noqa: E402
 from beyond_mocap.motion.motion import Motion, at_frames, place, pose_kinematics  # noqa: E402
 from beyond_mocap.motion.quaternion import turned_about_up  # noqa: E402
 
-COLOURS = {
-    "skin": (0.60, 0.36, 0.24),
-    "shirt": (0.72, 0.06, 0.05),
-    "shorts": (0.86, 0.86, 0.84),
-    "socks": (0.72, 0.06, 0.05),
-    "boots": (0.03, 0.03, 0.035),
-    "hair": (0.045, 0.028, 0.02),
-}
+COLOURS = {"skin": (0.60, 0.36, 0.24), "shirt": (0.72, 0.06, 0.05), "shorts": (0.86, 0.86, 0.84),
+           "socks": (0.72, 0.06, 0.05), "boots": (0.03, 0.03, 0.035), "hair": (0.045, 0.028, 0.02)}
 BALL_RADIUS = 0.11
 
 
@@ -68,12 +62,8 @@ def new_scene(width: int, height: int, samples: int = 24) -> bpy.types.Scene:
     sun = bpy.data.objects.new("sun", light)
     sun.rotation_euler = (0.75, 0.15, -0.5)
     scene.collection.objects.link(sun)
-    add_mesh(
-        "grass",
-        [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)],
-        [(0, 1, 2, 3)],
-        [paint("grass", (0.10, 0.25, 0.07))],
-    )
+    add_mesh("grass", [(-300, -300, 0), (300, -300, 0), (300, 300, 0), (-300, 300, 0)], [(0, 1, 2, 3)],
+             [paint("grass", (0.10, 0.25, 0.07))])
     return scene
 
 
@@ -175,16 +165,8 @@ def _grid(tiles: list[np.ndarray], columns: int) -> np.ndarray:
     return sheet
 
 
-def strip(
-    motion: Motion,
-    frames: np.ndarray,
-    out_png,
-    *,
-    ball=None,
-    spacing: float = 1.15,
-    samples: int = 12,
-    width: int = 1300,
-) -> None:
+def strip(motion: Motion, frames: np.ndarray, out_png, *, ball=None, spacing: float = 1.15, samples: int = 12,
+          width: int = 1300) -> None:
     """One motion at `frames` (N,) side by side, seen from the side and (below) half from the front: for looking at a
     cycle.
 

@@ -230,9 +230,8 @@ def run(out: pathlib.Path) -> None:
     import bpy
 
     told = load("beyond_mocap.cli.main").Told(False)
-    steps = Steps(
-        told, {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Accept": 0.03, "Render": 0.65, "Save": 0.02}
-    )
+    steps = Steps(told,
+                  {"Library": 0.2, "player1": 0.05, "player2": 0.05, "Accept": 0.03, "Render": 0.65, "Save": 0.02})
     with quiet():
         prepare(bpy)
     settings, session = bpy.context.scene.beyond_mocap, load("scene.core.session")

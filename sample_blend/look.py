@@ -126,9 +126,8 @@ def _grid(draw, view: View, step: float = 0.5) -> None:
         draw.rectangle([0, 0, view.size, horizon], fill=SKY)
 
 
-def sheet(
-    motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220, wide=2.2
-):
+def sheet(motion: Motion, frames, out, *, camera="follow", side=-90.0, ball=None, labels=None, columns=6, tile=220,
+          wide=2.2):
     """Writes the contact sheet of `frames` (N,) to `out`. side: degrees from +x at which the camera stands; ball:
     (N, 3) m or None; labels: N texts or None; wide: metres across a tile of the following camera."""
     from PIL import Image, ImageDraw
@@ -168,9 +167,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("take", help="BVH that synthesize wrote")
     parser.add_argument("--out", required=True, help="PNG to write")
     parser.add_argument("--ball", help="its ball CSV")
-    parser.add_argument(
-        "--provenance", help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels"
-    )
+    parser.add_argument("--provenance",
+                        help="its provenance CSV: marks standing feet (L, R) and seams (|) on the labels")
     parser.add_argument("--camera", choices=("follow", "fixed", "strobe"), default="follow")
     parser.add_argument("--side", type=float, default=-90.0, help="degrees from +x at which the camera stands")
     parser.add_argument("--from", dest="start", type=float, default=0.0, help="seconds from the take's first frame")
@@ -207,10 +205,8 @@ def run(options) -> None:
         marks = [("L" if l else ".") + ("R" if r else ".") for l, r in told.contacts[frames]]
         new = [f > 0 and (told.clip[f] != told.clip[f - 1] or told.mirrored[f] != told.mirrored[f - 1]) for f in frames]
         labels = [f"{a} {m}{'|' if s else ''}" for a, m, s in zip(labels, marks, new)]
-    sheet(
-        motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
-        columns=options.columns, tile=options.tile, wide=options.wide,
-    )
+    sheet(motion, frames, options.out, camera=options.camera, side=options.side, ball=ball, labels=labels,
+          columns=options.columns, tile=options.tile, wide=options.wide)
 
 
 if __name__ == "__main__":

@@ -36,9 +36,8 @@ _STATIC_FRAMES = 60
 def thrown() -> Planted:
     """The throw, its static trial and the truth of both; the second around the ball's release."""
     made = throw(TARGET, SPEED, fps=_THROW_FPS)
-    return planted(
-        made.motion, "driveline", seed=11, ball=PlantedBall(made.release, turns=18.0, seen=0.12), occlusion=0.01
-    )
+    return planted(made.motion, "driveline", seed=11, ball=PlantedBall(made.release, turns=18.0, seen=0.12),
+                   occlusion=0.01)
 
 
 def walked() -> Planted:

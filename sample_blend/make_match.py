@@ -34,24 +34,18 @@ BESIDE = 0.38  # m from the middle of a player to the ball that he touches
 CLOCK_LATE = 2.4  # s by which the events' clock is late
 EVENTS_SCATTER = 0.12  # s, standard deviation of the events' times beside the touches
 
-PLAYERS = {
-    "home_1": "Ada Keeper", "home_4": "Ben Back", "home_7": "Cora Wing", "home_10": "Dan Striker",
-    "away_1": "Eva Keeper", "away_5": "Finn Back", "away_6": "Gus Middle", "away_9": "Hana Forward",
-    "away_14": "Ivo Fresh",
-}  # fmt: skip
+PLAYERS = {"home_1": "Ada Keeper", "home_4": "Ben Back", "home_7": "Cora Wing", "home_10": "Dan Striker",
+           "away_1": "Eva Keeper", "away_5": "Finn Back", "away_6": "Gus Middle", "away_9": "Hana Forward",
+           "away_14": "Ivo Fresh"}
 PRESENT = {"away_9": (0.0, 9.0), "away_14": (11.0, SECONDS)}
 """Seconds in which players are on the pitch who are not there all the time."""
-
 PLACES = {
     "home_1": ((0, -47, 0), (12, -44, 1.5), (24, -47, 0.5)),
     "home_4": ((0, -20, -9), (9, -12, -6), (15, -6, 2), (24, -13, 6)),
     "home_7": ((0, 6, -13), (17, 28, -14), (24, 12, -9)),
-    "home_10": ((0, -1, 1.5), (6, 18, 2), (16, 30, 3), (24, 14, 4)),
-    "away_1": ((0, 48, 0), (8, 50, -1), (24, 47, 0)),
-    "away_5": ((0, 24, 5), (7, 38, 0), (18, 30, 4), (24, 22, 3)),
-    "away_6": ((0, 10, -6), (6, 20, -14), (24, 3, -3)),
-    "away_9": ((0, 4, 4), (5, -4, 9), (9, -3, 31)),
-    "away_14": ((11, -3, 33.5), (13.5, -4, 24), (24, -32, 3)),
+    "home_10": ((0, -1, 1.5), (6, 18, 2), (16, 30, 3), (24, 14, 4)), "away_1": ((0, 48, 0), (8, 50, -1), (24, 47, 0)),
+    "away_5": ((0, 24, 5), (7, 38, 0), (18, 30, 4), (24, 22, 3)), "away_6": ((0, 10, -6), (6, 20, -14), (24, 3, -3)),
+    "away_9": ((0, 4, 4), (5, -4, 9), (9, -3, 31)), "away_14": ((11, -3, 33.5), (13.5, -4, 24), (24, -32, 3)),
 }
 """Where each is when he has nothing to do with the ball: (s, x, y) m."""
 
@@ -68,27 +62,23 @@ class Touch:
     seconds: float
 
 
-TOUCHES = (
-    Touch("home_10", "kick right low inside", "foot", (-13, -8), 1.5),
-    Touch("home_4", "receive right foot low", "foot", (-11.6, -7.6), 0.9),
-    Touch("home_4", "kick right high top", "foot", (15, -17, 1.2), 1.9),
-    Touch("home_7", "receive chest", "chest", (16.5, -17.4), 0.8),
-    Touch("home_7", "dribble", "foot", (20.2, -18.2), 0.8),
-    Touch("home_7", "dribble", "foot", (24.2, -18.8), 0.8),
-    Touch("home_7", "dribble", "foot", (28.6, -19), 0.8),
-    Touch("home_7", "kick right high inside", "foot", (38, 1, 1.95), 1.6),
-    Touch("home_10", "header", "head", (44, 4), 1.0),
-    Touch("away_5", "kick right high top", "foot", (16, -5, 0.3), 2.2),
-    Touch("away_6", "receive right foot low", "foot", (14.5, -4.6), 0.9),
-    Touch("away_6", "kick right low inside", "foot", (-6, 12), 1.9),
-    Touch("away_14", "receive left foot low", "foot", (-8.4, 12), 0.8),
-    Touch("away_14", "dribble", "foot", (-12.2, 10.8), 0.9),
-    Touch("away_14", "dribble", "foot", (-16.4, 8.8), 0.9),
-    Touch("away_14", "kick right low top", "foot", (-43.7, 0.8), 1.6),
-    Touch("home_1", "receive right foot low", "foot", (-43, 0.8), 2.0),
-)
+TOUCHES = (Touch("home_10", "kick right low inside", "foot", (-13, -8), 1.5),
+           Touch("home_4", "receive right foot low", "foot", (-11.6, -7.6), 0.9),
+           Touch("home_4", "kick right high top", "foot", (15, -17, 1.2), 1.9),
+           Touch("home_7", "receive chest", "chest", (16.5, -17.4), 0.8),
+           Touch("home_7", "dribble", "foot", (20.2, -18.2), 0.8),
+           Touch("home_7", "dribble", "foot", (24.2, -18.8), 0.8), Touch("home_7", "dribble", "foot", (28.6, -19), 0.8),
+           Touch("home_7", "kick right high inside", "foot", (38, 1, 1.95), 1.6),
+           Touch("home_10", "header", "head", (44, 4), 1.0),
+           Touch("away_5", "kick right high top", "foot", (16, -5, 0.3), 2.2),
+           Touch("away_6", "receive right foot low", "foot", (14.5, -4.6), 0.9),
+           Touch("away_6", "kick right low inside", "foot", (-6, 12), 1.9),
+           Touch("away_14", "receive left foot low", "foot", (-8.4, 12), 0.8),
+           Touch("away_14", "dribble", "foot", (-12.2, 10.8), 0.9),
+           Touch("away_14", "dribble", "foot", (-16.4, 8.8), 0.9),
+           Touch("away_14", "kick right low top", "foot", (-43.7, 0.8), 1.6),
+           Touch("home_1", "receive right foot low", "foot", (-43, 0.8), 2.0))
 """All touches in order; the first is at KICK_OFF, each later one when the ball is there."""
-
 EVENTS = {"kick": "pass", "header": "pass", "receive": "ball touch"}
 """What the provider calls a touch, by its first word; it does not tell of dribbles."""
 
@@ -176,11 +166,8 @@ def write_metrica(folder: Path) -> None:
     times, seen, ball = feed()
     for team in ("Home", "Away"):
         ids = [player for player in seen if player.startswith(team.lower())]
-        heads = [
-            [",,", *(f"{team}," for _ in ids), ","],
-            [",,", *(f"{player.split('_')[1]}," for player in ids), ","],
-            ["Period,Frame,Time [s]", *(f"Player{player.split('_')[1]}," for player in ids), "Ball,"],
-        ]
+        heads = [[",,", *(f"{team}," for _ in ids), ","], [",,", *(f"{player.split('_')[1]}," for player in ids), ","],
+                 ["Period,Frame,Time [s]", *(f"Player{player.split('_')[1]}," for player in ids), "Ball,"]]
         lines = [",".join(cells) for cells in heads]
         for row, time in enumerate(times):
             places = [*(seen[player][row] for player in ids), ball[row, :2]]

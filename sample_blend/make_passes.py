@@ -21,21 +21,16 @@ from beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timeline  
 from beyond_mocap.files.bvh import bvh  # noqa: E402
 from beyond_mocap.synthetic.volleys import VOLLEYS, idle, volley  # noqa: E402
 
-TAKEN = (
-    "standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6",
-    "walking_turn_left", "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking",
-    "walk_jog_walk", "jogging_2_4", "jogging_3_5", "jogging_back", "header",
-)  # fmt: skip
+TAKEN = ("standing_turn_left", "standing_turn_right", "walking_0_8", "walking_1_2", "walking_1_6", "walking_turn_left",
+         "walking_turn_right", "walking_back", "walking_left", "walking_right", "start_stop_walking", "walk_jog_walk",
+         "jogging_2_4", "jogging_3_5", "jogging_back", "header")
 """Clips of the sample's library that are taken over."""
-
 STOPPED = 186
 """Frames after which who starts and stops has stopped; behind them the clip goes on with half a step."""
-
-STRIKES = (
-    ("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
-    ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0), ("head", "head", 1.25),
-    ("chest", "chest", 1.0), ("hand", "hand", 1.3), ("racquet", "racquet", 1.0), ("racquet_slow", "racquet", 0.8),
-)  # fmt: skip
+STRIKES = (("toss", "toss", 1.25), ("toss_quick", "toss", 1.5), ("pass", "pass", 1.25), ("pass_quick", "pass", 1.45),
+           ("attack", "attack", 1.4), ("attack_quick", "attack", 1.6), ("receive", "receive", 1.0),
+           ("head", "head", 1.25), ("chest", "chest", 1.0), ("hand", "hand", 1.3), ("racquet", "racquet", 1.0),
+           ("racquet_slow", "racquet", 0.8))
 """Name, kind (`synthetic.volleys`) and speed of every strike."""
 
 

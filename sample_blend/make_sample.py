@@ -60,12 +60,8 @@ def _standing() -> list[Clip]:
 
 
 def _straight() -> list[Clip]:
-    table = (
-        ("walking", (0.8, 1.2, 1.6), 6.4),
-        ("jogging", (2.4, 2.9, 3.5), 6.0),
-        ("running", (4.2, 4.9), 6.0),
-        ("sprinting", (6.0, 7.2, 8.6), 6.0),
-    )
+    table = (("walking", (0.8, 1.2, 1.6), 6.4), ("jogging", (2.4, 2.9, 3.5), 6.0), ("running", (4.2, 4.9), 6.0),
+             ("sprinting", (6.0, 7.2, 8.6), 6.0))
     return [
         Clip(f"{word}_{speed:.1f}".replace(".", "_"), gait(speed + _breeze(seconds, i), None, FPS, seed=10 + i), None)
         for word, speeds, seconds in table
@@ -75,11 +71,8 @@ def _straight() -> list[Clip]:
 
 def _curves() -> list[Clip]:
     out = []
-    for word, speed, rate, seconds in (
-        ("walking", 1.3, 0.75, 7.0),
-        ("jogging", 2.8, 0.7, 6.0),
-        ("running", 4.6, 0.5, 6.0),
-    ):
+    for word, speed, rate, seconds in (("walking", 1.3, 0.75, 7.0), ("jogging", 2.8, 0.7, 6.0),
+                                       ("running", 4.6, 0.5, 6.0)):
         for side, sign in (("left", 1.0), ("right", -1.0)):
             times = _times(seconds)
             rates = sign * rate * (0.25 + 1.5 * np.sin(np.pi * times / seconds) ** 2)
@@ -94,12 +87,8 @@ def _curves() -> list[Clip]:
 
 def _other_ways() -> list[Clip]:
     out = []
-    for word, way, angle, speed in (
-        ("walking", "back", np.pi, 1.1),
-        ("jogging", "back", np.pi, 2.3),
-        ("walking", "left", np.pi / 2, 0.9),
-        ("walking", "right", -np.pi / 2, 0.9),
-    ):
+    for word, way, angle, speed in (("walking", "back", np.pi, 1.1), ("jogging", "back", np.pi, 2.3),
+                                    ("walking", "left", np.pi / 2, 0.9), ("walking", "right", -np.pi / 2, 0.9)):
         speeds = _profile(((0, 0), (1.2, speed), (5.2, speed), (6.4, 0), (6.8, 0)))
         out.append(Clip(f"{word}_{way}", gait(speeds, None, FPS, direction=angle, seed=30), (word, way)))
     return out
@@ -107,17 +96,8 @@ def _other_ways() -> list[Clip]:
 
 def _changes() -> list[Clip]:
     table = {
-        "start_stop_walking": (
-            (0, 0),
-            (0.8, 0),
-            (2.0, 1.3),
-            (4.0, 1.4),
-            (5.4, 0),
-            (6.4, 0),
-            (7.4, 0.9),
-            (8.6, 0),
-            (9.4, 0),
-        ),
+        "start_stop_walking": ((0, 0), (0.8, 0), (2.0, 1.3), (4.0, 1.4), (5.4, 0), (6.4, 0), (7.4, 0.9), (8.6, 0),
+                               (9.4, 0)),
         "walk_jog_walk": ((0, 1.3), (1.5, 1.5), (3.2, 2.8), (5.5, 3.0), (7.5, 1.5), (9.0, 1.3)),
         "jog_run_jog": ((0, 2.6), (1.5, 2.9), (4.0, 4.8), (6.0, 4.8), (8.5, 2.7), (9.5, 2.6)),
         "stand_sprint_stop": ((0, 0), (0.6, 0), (1.8, 4.0), (4.6, 8.2), (6.0, 8.4), (9.6, 1.0), (10.6, 0), (11.2, 0)),
@@ -139,11 +119,8 @@ def _moves() -> list[Clip]:
     ]
     for name, gesture, words in (
         ("kick_low_inside", strike("kick low inside"), "kick right low inside running front"),
-        (
-            "kick_low_inside_slow",
-            strike("kick low inside", fps=FPS, speed=0.6, seed=1),
-            "kick right low inside standing front",
-        ),
+        ("kick_low_inside_slow", strike("kick low inside", fps=FPS, speed=0.6, seed=1),
+         "kick right low inside standing front"),
         ("kick_low_top", strike("kick low top"), "kick right low top running front"),
         ("receive_foot", strike("receive foot low inside"), "receive right foot low inside front"),
         ("header", header(fps=FPS), "header standing jump front"),
@@ -176,9 +153,8 @@ def _by_speed(motion: Motion) -> list[Span]:
     before."""
     width = int(motion.fps)
     window = np.hanning(width + 2)[1:-1]
-    padded = np.pad(
-        motion.root_positions[:, :2], ((width // 2, width - 1 - width // 2), (0, 0)), mode="reflect", reflect_type="odd"
-    )
+    padded = np.pad(motion.root_positions[:, :2], ((width // 2, width - 1 - width // 2), (0, 0)), mode="reflect",
+                    reflect_type="odd")
     smooth = np.stack([np.convolve(padded[:, a], window / window.sum(), mode="valid") for a in (0, 1)], axis=-1)
     velocity = np.gradient(smooth, 1.0 / motion.fps, axis=0)
     names = np.searchsorted([limit for _, limit in _GAITS], np.linalg.norm(velocity, axis=1), side="right")
@@ -190,11 +166,8 @@ def _by_speed(motion: Motion) -> list[Span]:
         else:
             spans.append([begin, end, word])
     return [
-        Span(
-            round(begin / motion.fps, 3),
-            round((end - 1) / motion.fps, 3),
-            (word,) if word == "standing" else (word, "front"),
-        )
+        Span(round(begin / motion.fps, 3), round((end - 1) / motion.fps, 3),
+             (word,) if word == "standing" else (word, "front"))
         for begin, end, word in spans
     ]
 
@@ -227,91 +200,30 @@ MATCH_SECONDS = 40.0
 BALL_RADIUS = 0.11
 # seconds, x, y: where the players really are (their tracks add the noise of a tracking system)
 PATHS = {
-    "player1": (
-        (0, -21, 7.6),
-        (1.5, -21, 7.6),
-        (3, -19.6, 7.7),
-        (4.5, -16.2, 7.6),
-        (6, -12.4, 6.6),
-        (7.4, -9.2, 4.6),
-        (8.5, -6.9, 2.9),
-        (9.5, -4.9, 2.2),
-        (10.5, -1.0, 2.4),
-        (11.5, 4.7, 3.7),
-        (12.5, 11.9, 5.5),
-        (13.5, 19.0, 7.5),
-        (14.3, 22.8, 9.0),
-        (15.1, 24.6, 10.2),
-        (16, 25.2, 10.5),
-        (17, 24.6, 9.3),
-        (17.9, 23.9, 8.0),
-        (18.6, 23.8, 7.2),
-        (19.4, 24.6, 6.5),
-        (20.5, 26.9, 5.9),
-        (22, 31.2, 5.0),
-        (23.5, 36.0, 3.9),
-        (24.8, 39.4, 3.1),
-        (25.6, 40.7, 2.8),
-        (26.6, 42.8, 3.2),
-        (28, 46.6, 5.6),
-        (29.4, 49.0, 9.6),
-        (30.8, 48.6, 14.0),
-        (32, 46.4, 16.4),
-        (33.4, 44.9, 17.2),
-        (35, 44.2, 17.5),
-        (40, 44.1, 17.5),
-    ),
-    "player2": (
-        (0, 15.6, -11.2),
-        (2, 15.5, -11.1),
-        (4, 15.2, -10.2),
-        (6, 14.2, -9.4),
-        (7.5, 11.8, -8.4),
-        (8.8, 8.6, -7.3),
-        (9.6, 7.0, -6.7),
-        (10.2, 6.4, -6.4),
-        (10.9, 5.9, -6.0),
-        (11.7, 6.0, -5.1),
-        (12.6, 7.2, -4.5),
-        (14, 10.6, -3.2),
-        (15.3, 14.0, -1.4),
-        (16.5, 16.9, 1.0),
-        (17.2, 18.0, 2.0),
-        (18.5, 20.1, 2.5),
-        (20.5, 24.0, 0.8),
-        (22.5, 29.2, -2.4),
-        (24.5, 34.6, -5.0),
-        (26, 37.8, -4.8),
-        (27, 40.0, -2.4),
-        (28, 42.2, 1.6),
-        (29, 44.2, 6.4),
-        (30, 45.3, 10.8),
-        (31, 45.2, 13.6),
-        (32, 44.5, 15.0),
-        (33.5, 43.5, 15.9),
-        (35, 43.0, 16.3),
-        (36, 43.0, 16.3),
-        (37.2, 42.4, 15.6),
-        (39, 40.4, 14.0),
-        (40, 39.4, 13.2),
-    ),
+    "player1": ((0, -21, 7.6), (1.5, -21, 7.6), (3, -19.6, 7.7), (4.5, -16.2, 7.6), (6, -12.4, 6.6), (7.4, -9.2, 4.6),
+                (8.5, -6.9, 2.9), (9.5, -4.9, 2.2), (10.5, -1.0, 2.4), (11.5, 4.7, 3.7), (12.5, 11.9, 5.5),
+                (13.5, 19.0, 7.5), (14.3, 22.8, 9.0), (15.1, 24.6, 10.2), (16, 25.2, 10.5), (17, 24.6, 9.3),
+                (17.9, 23.9, 8.0), (18.6, 23.8, 7.2), (19.4, 24.6, 6.5), (20.5, 26.9, 5.9), (22, 31.2, 5.0),
+                (23.5, 36.0, 3.9), (24.8, 39.4, 3.1), (25.6, 40.7, 2.8), (26.6, 42.8, 3.2), (28, 46.6, 5.6),
+                (29.4, 49.0, 9.6), (30.8, 48.6, 14.0), (32, 46.4, 16.4), (33.4, 44.9, 17.2), (35, 44.2, 17.5),
+                (40, 44.1, 17.5)),
+    "player2": ((0, 15.6, -11.2), (2, 15.5, -11.1), (4, 15.2, -10.2), (6, 14.2, -9.4), (7.5, 11.8, -8.4),
+                (8.8, 8.6, -7.3), (9.6, 7.0, -6.7), (10.2, 6.4, -6.4), (10.9, 5.9, -6.0), (11.7, 6.0, -5.1),
+                (12.6, 7.2, -4.5), (14, 10.6, -3.2), (15.3, 14.0, -1.4), (16.5, 16.9, 1.0), (17.2, 18.0, 2.0),
+                (18.5, 20.1, 2.5), (20.5, 24.0, 0.8), (22.5, 29.2, -2.4), (24.5, 34.6, -5.0), (26, 37.8, -4.8),
+                (27, 40.0, -2.4), (28, 42.2, 1.6), (29, 44.2, 6.4), (30, 45.3, 10.8), (31, 45.2, 13.6),
+                (32, 44.5, 15.0), (33.5, 43.5, 15.9), (35, 43.0, 16.3), (36, 43.0, 16.3), (37.2, 42.4, 15.6),
+                (39, 40.4, 14.0), (40, 39.4, 13.2)),
 }
 # who touches the ball when, and how: seconds, player, words
-TOUCHES = (
-    (8.5, "player1", "kick right running low inside"),
-    (10.2, "player2", "receive right foot low inside"),
-    (16.5, "player2", "kick right running low inside"),
-    (17.9, "player1", "receive right foot low inside"),
-    (24.8, "player1", "kick right running low top"),
-)
+TOUCHES = ((8.5, "player1", "kick right running low inside"), (10.2, "player2", "receive right foot low inside"),
+           (16.5, "player2", "kick right running low inside"), (17.9, "player1", "receive right foot low inside"),
+           (24.8, "player1", "kick right running low top"))
 DRIBBLES = ((1.0, 8.5, "player1"), (10.2, 16.5, "player2"), (17.9, 24.8, "player1"))
 NET = (25.5, (53.2, 1.4, 0.9))
 STRETCHES = {
-    "player1": (
-        (2.4, 8.0, "jogging dribble"),
-        (19.2, 24.2, "jogging dribble"),
-        (26.4, 31.4, "celebration running arms outside"),
-    ),
+    "player1": ((2.4, 8.0, "jogging dribble"), (19.2, 24.2, "jogging dribble"),
+                (26.4, 31.4, "celebration running arms outside")),
     "player2": ((11.6, 16.0, "jogging dribble"),),
 }
 
@@ -391,9 +303,8 @@ def tracked(times: np.ndarray, positions: np.ndarray, seed: int, slow: float = 0
     random = np.random.default_rng(seed)
     drift = random.normal(size=(len(times) + 80, positions.shape[1]))
     window = np.hanning(43)[1:-1]
-    drift = np.stack(
-        [np.convolve(drift[:, a], window, mode="valid")[: len(times)] for a in range(positions.shape[1])], -1
-    )
+    drift = np.stack([np.convolve(drift[:, a], window, mode="valid")[: len(times)] for a in range(positions.shape[1])],
+                     -1)
     drift = drift / np.sqrt(np.sum(window**2))
     return positions + slow * drift / np.sqrt(2.0) + fast * random.normal(size=positions.shape)
 

@@ -57,11 +57,9 @@ class Aimed:
     possible: np.ndarray
 
 
-def aim(
-    start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
-    spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None, ground: float = 0.0,
-    loft: float | None = None, about: np.ndarray | None = None,
-) -> Aimed:
+def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, bounces: int = 0,
+        spin: np.ndarray | None = None, fastest: float | None = None, near: np.ndarray | None = None,
+        ground: float = 0.0, loft: float | None = None, about: np.ndarray | None = None) -> Aimed:
     """Launches from `start` (B, 3) m so that after exactly `bounces` bounces the ball's centre is at `target` (B, 3) m.
 
     seconds (B,) after the launch; a number: all alike; None: the time with the slowest launch, or the one that leaves
@@ -90,10 +88,8 @@ def aim(
     return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def along_ground(
-    start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None, arrives: float = 2.0,
-    fastest: float | None = None, ground: float = 0.0,
-) -> Aimed:
+def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray | None = None,
+                 arrives: float = 2.0, fastest: float | None = None, ground: float = 0.0) -> Aimed:
     """Level launches from `start` (B, 3) m for balls that slide and roll to where `target` (B, 3) m lies on the ground.
 
     seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
@@ -116,9 +112,8 @@ def along_ground(
     return Aimed(velocity=velocity, spin=problem.spin, seconds=problem.seconds, miss=miss, possible=possible)
 
 
-def out_of_reach(
-    start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float, what: str
-) -> InputError:
+def out_of_reach(start: np.ndarray, target: np.ndarray, aimed: Aimed, index: int, fastest: float,
+                 what: str) -> InputError:
     """The error that says why aim `index` cannot be: how far it is, how fast the ball would have to leave, and what a
     human gives. what: who or which pass is meant."""
     start, target = np.atleast_2d(start), np.atleast_2d(target)
@@ -207,7 +202,7 @@ class _Problem:
         bool: whether there is one that is at the target's height in time."""
         way = self.target - self.start
         drag = self.ball.linear_drag + self.ball.drag * length(way) / self.seconds
-        level = way[:, :2] / (_shares(drag * self.seconds)[0] * self.seconds)[:, None]
+        level = way[:, :2] / (batch.drag_shares(drag * self.seconds)[0] * self.seconds)[:, None]
         upward, found = self._upward(drag)
         return np.column_stack([level, upward]), found
 
@@ -215,7 +210,7 @@ class _Problem:
         """(B,) m/s: the highest launch upward with which such a ball is at the target's height in time, and (B,) bool
         whether there is one; else the nearest to it."""
         gravity, low = self.ball.gravity, self.ground + self.ball.radius
-        first, second = _shares(drag * self.seconds)
+        first, second = batch.drag_shares(drag * self.seconds)
         direct = (self.target[:, 2] - self.start[:, 2] + gravity * self.seconds**2 * second) / (self.seconds * first)
         if not self.bounces:
             return direct, np.ones(len(direct), bool)
@@ -347,17 +342,9 @@ def _height_after(height, upward, drag, seconds, bounces: int, ball: Ball) -> np
 
 def _fallen(height, upward, drag, seconds, gravity: float) -> tuple[np.ndarray, np.ndarray]:
     """Height and speed upward after `seconds` under linear drag."""
-    first, second = _shares(drag * seconds)
+    first, second = batch.drag_shares(drag * seconds)
     place = height + upward * seconds * first - gravity * seconds**2 * second
     return place, upward * np.exp(-drag * seconds) - gravity * seconds * first
-
-
-def _shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(1 - e^-d) / d, and (1 - that) / d, for d >= 0."""
-    small = drag < 1e-4
-    safe = np.where(small, 1.0, drag)
-    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
-    return first, np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
 
 
 def _highest_root(value, tried: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -40,9 +40,8 @@ class Balls:
         return Balls(*(value[which] for value in vars(self).values()))
 
 
-def launched(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, ground: float = 0.0
-) -> Balls:
+def launched(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+             ground: float = 0.0) -> Balls:
     """Balls (B) at their launch; the arguments (B, 3), or (3,) for all alike; spin None: none. One that lies too low is
     set onto the ground, and meets it at once where its way leads down."""
     spin = np.zeros(3) if spin is None else spin
@@ -57,9 +56,8 @@ def launched(
 
 
 @np.errstate(over="ignore", invalid="ignore")  # launches that are tried may be faster than numbers go
-def after(
-    balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0, most_bounces: int | None = None
-) -> Balls:
+def after(balls: Balls, ball: Ball, seconds: float | np.ndarray, ground: float = 0.0,
+          most_bounces: int | None = None) -> Balls:
     """The balls `seconds` (B,) or one number later. most_bounces: then they fly on through the ground (what a solver
     wants, whose targets must move smoothly with the launch)."""
     balls = Balls(*(value.copy() for value in vars(balls).values()))
@@ -75,10 +73,8 @@ def after(
     return balls
 
 
-def states(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, seconds: np.ndarray,
-    ground: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball,
+           seconds: np.ndarray, ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
     alike).
 
@@ -88,10 +84,8 @@ def states(
     return balls.position, balls.velocity
 
 
-def courses(
-    position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
-    ground: float = 0.0,
-) -> tuple[np.ndarray, np.ndarray]:
+def courses(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray | None, ball: Ball, times: np.ndarray,
+            ground: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Positions and velocities (B, T, 3) of balls at `times` (T,) s after their launch, ascending and not negative."""
     balls = launched(position, velocity, spin, ball, ground)
     places, velocities = [], []
@@ -100,6 +94,14 @@ def courses(
         places.append(balls.position)
         velocities.append(balls.velocity)
     return np.stack(places, axis=1), np.stack(velocities, axis=1)
+
+
+def drag_shares(drag: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(1 - e^-d) / d, and (1 - that) / d, for d >= 0; by their series where d is small."""
+    small = drag < 1e-4
+    safe = np.where(small, 1.0, drag)
+    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
+    return first, np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
 
 
 def _has_closed_form(balls: Balls, ball: Ball) -> bool:
@@ -217,11 +219,7 @@ def _closed(position, velocity, spin, steps, ball: Ball) -> tuple[np.ndarray, np
     """Flight under gravity and linear drag alone, any `steps` (W,) s long."""
     drag = ball.linear_drag * steps
     falling = np.array([0.0, 0.0, -ball.gravity])
-    # (1 - e^-d) / d and (1 - that) / d, by their series where d is small
-    small = drag < 1e-4
-    safe = np.where(small, 1.0, drag)
-    first = np.where(small, 1.0 - drag / 2.0 + drag**2 / 6.0, -np.expm1(-safe) / safe)
-    second = np.where(small, 0.5 - drag / 6.0 + drag**2 / 24.0, (1.0 - first) / safe)
+    first, second = drag_shares(drag)
     place = position + velocity * (steps * first)[:, None] + falling * (steps**2 * second)[:, None]
     faster = velocity * np.exp(-drag)[:, None] + falling * (steps * first)[:, None]
     return place, faster, spin * np.exp(-ball.spin_decay * steps)[:, None]

@@ -23,7 +23,6 @@ PARTS = (*BODY_PARTS, "tool")
 
 JOINT_RADIUS = 0.06
 """Metres around a joint that strikes, where it is none of PARTS."""
-
 _SECONDS = 1.0 / 120.0  # to either side, over which a part's speed is measured
 
 

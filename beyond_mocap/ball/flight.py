@@ -1,4 +1,5 @@
-"""One ball's whole way from a launch until it rests: flight, bounces, sliding, rolling (Ball handling §4 eq. 3 to 6).
+"""One ball's whole way from a launch until it rests: flight, bounces, sliding, rolling (Ball handling §4 eq. 3 to 6),
+and where it meets a wall (Fredriksson §8.2's impact points) or the plane of its target.
 
 The pieces between bounces are integrated by scipy's DOP853 with the bounce as an event (eq. 4), the bounce itself is an
 impulse (eq. 5). A ball that would rise less than a few millimetres again stays on the ground, so that its bounces end.
@@ -21,6 +22,10 @@ STANDS_STILL = 1e-6
 """m/s of the lowest point below which a ball rolls."""
 FINE = 1.0 / 480.0
 """s: the steps in which rotations are summed up."""
+_IMPACT_STEP = 1.0 / 480.0  # s between the places that are looked at first
+
+_LONGEST_TO_WALL = 6.0  # s that a flight is followed
+_WALL_STEP = 0.004  # s between the places that are looked at
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,3 +255,51 @@ def _one_after_another(turns: np.ndarray) -> np.ndarray:
         out[shift:] = quaternion.multiply(out[shift:], out[:-shift])
         shift *= 2
     return out
+
+
+def find_crossing(flight: Flight, target: np.ndarray) -> np.ndarray:
+    """(3,) m: the ball's centre where it first meets the upright plane through `target` (3,) m that is square to the
+    line from its launch, or the ground before that; NaN where it does neither by the flight's end."""
+    start = np.asarray(flight.launch.position, float)
+    level = (np.asarray(target, float) - start) * [1.0, 1.0, 0.0]
+    far = float(np.linalg.norm(level))
+    level /= max(far, 1e-9)
+    last = min([flight.end, *flight.bounces[:1], *([flight.rolls_from] if flight.rolls_from is not None else [])])
+    if last <= flight.launch.time:  # it leaves along the ground
+        last = flight.end
+    times = np.append(np.arange(flight.launch.time, last, _IMPACT_STEP), last)
+    gone = (flight.at(times) - start) @ level
+    beyond = np.flatnonzero(gone >= far)
+    if not len(beyond):
+        return flight.at([last])[0] if last < flight.end else np.full(3, np.nan)
+    low, high = times[max(beyond[0] - 1, 0)], times[beyond[0]]
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if (flight.at([middle])[0] - start) @ level >= far else (middle, high)
+    return flight.at([high])[0]
+
+
+def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.ndarray, ahead: np.ndarray,
+               spin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[np.ndarray, float]:
+    """Place (3,) m of the ball's centre at the wall and seconds after its launch; at its first touch of the ground
+    where that comes first, and where it is after 6 s or four times what it would take without air where neither does.
+
+    position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground,
+    ahead (2,): from where it is thrown towards it, the wall's normal.
+    """
+    unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
+    free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # else it bounces as it is launched
+    flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),
+                 landing=free)
+    touches = [time for time in (*flight.bounces[:1], flight.rolls_from) if time is not None and time > _WALL_STEP]
+    last = min(touches, default=flight.end)
+    times = np.append(np.arange(0.0, last, _WALL_STEP), last)
+    places = flight.at(times)
+    beyond = (places[:, :2] - foot) @ (np.asarray(ahead, float) / np.hypot(*ahead))
+    through = np.flatnonzero((beyond[:-1] < 0.0) & (beyond[1:] >= 0.0))
+    if not len(through):
+        return places[-1], float(last)
+    i = int(through[0])
+    share = -beyond[i] / (beyond[i + 1] - beyond[i])
+    seconds = times[i] + share * (times[i + 1] - times[i])
+    return flight.at(np.array([seconds]))[0], float(seconds)

@@ -46,7 +46,6 @@ class Ball:
 PAPER = Ball("paper", 0.11, 0.43, linear_drag=0.2)
 """Ball handling §5: air resistance 0.2 (taken as -0.2 v per second), elasticity 0.7, gravity 9.8; no spin. How it rolls
 is not said there; it slows as a football does."""
-
 FOOTBALL = Ball("football", 0.11, 0.43, 9.81, drag=0.0133, lift=(0.0531, 2.0, 0.4), restitution=0.62, friction=0.5,
                 rolling=1.0, spin_decay=0.05)
 """C_D 0.25, between the 0.2 that Goff & Carre, "Trajectory analysis of a soccer ball", Am. J. Phys. 77 (2009), find
@@ -54,33 +53,27 @@ above the drag crisis near 12 m/s and the 0.4 and more below it (Asai et al., "F
 ball", Sports Eng. 10 (2007)); C_L about 0.3 for spin parameters of 0.3 (both), levelling off. Bounce and roll as on
 good turf: FIFA's test manual asks for a rebound of 0.6 to 0.85 m from 2 m and 4 to 8 m of roll from a 1 m ramp.
 Friction: 0.37 to 0.62 are measured ("The coefficient of friction of soccer balls", Proceedings 49 (2020) 92)."""
-
 VOLLEYBALL = Ball("volleyball", 0.105, 0.27, 9.81, drag=0.0192, lift=(0.0770, 2.0, 0.4), restitution=0.74, friction=0.5,
                   rolling=0.4, spin_decay=0.05)
 """C_D 0.25 between 0.15 above and 0.45 below the crisis (Asai et al., "A study of knuckle effect of volleyball",
 Procedia Eng. 2 (2010)); a hard floor."""
-
 TENNIS = Ball("tennis", 0.0335, 0.0577, 9.81, drag=0.0202, lift=(0.0367, 2.022, 0.981), restitution=0.745, friction=0.6,
               rolling=0.6, spin_decay=0.05, inertia=0.55)
 """C_D 0.55 (Mehta, Alam & Subic, "Aerodynamics of tennis balls", Sports Technol. 1 (2008)); lift: Stepanek, "The
 aerodynamics of tennis balls: the topspin lob", Am. J. Phys. 56 (1988); bounce: the rules ask for 1.35 to 1.47 m from
 2.54 m; inertia: Cross (2002)."""
-
 BASEBALL = Ball("baseball", 0.0366, 0.145, 9.81, drag=0.0061, lift=(0.0174, 2.32, 0.4), restitution=0.5, friction=0.5,
                 rolling=1.0, spin_decay=0.02, inertia=0.4)
 """C_D 0.35 at 30 to 40 m/s (Kagan & Nathan, "Simplified models for the drag coefficient of a pitched baseball", Phys.
 Teach. 52 (2014)); lift: Nathan, "The effect of spin on the flight of a baseball", Am. J. Phys. 76 (2008); size and
 weight: the rules' 9 to 9 1/4 in round and 5 to 5 1/4 oz."""
-
 HANDBALL = Ball("handball", 0.094, 0.45, 9.81, drag=0.0093, lift=(0.0370, 2.0, 0.4), restitution=0.7, friction=0.6,
                 rolling=0.6, spin_decay=0.05)
 """Size 3: 58 to 60 cm round, 425 to 475 g; C_D 0.25 as for other large balls above the drag crisis."""
-
 BALLS: dict[str, Ball] = {ball.name: ball for ball in (PAPER, FOOTBALL, VOLLEYBALL, TENNIS)}
 
 THROWN: dict[str, Ball] = {ball.name: ball for ball in (BASEBALL, TENNIS, HANDBALL, VOLLEYBALL, FOOTBALL)}
 """Balls that a hand throws."""
-
 FASTEST: dict[str, float] = {"foot": 38.0, "head": 23.0, "chest": 10.0, "hand": 38.0, "tool": 73.0}
 """m/s that a human gives a ball with a part. Foot: professionals' instep kicks reach 30 to 34 m/s (Kellis & Katis,
 "Biomechanical characteristics of instep soccer kick", J. Sports Sci. Med. 6 (2007)), records some more. Hand: the
@@ -138,9 +131,8 @@ def slip(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
     return out
 
 
-def sliding(
-    velocity: np.ndarray, spin: np.ndarray, ball: Ball, ahead: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
+            ahead: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground.
 
     ahead (..., 3): where the lowest point went at first; the push stays against it when the slip has turned about, so

@@ -10,7 +10,6 @@ from ..motion.track import BALL_RADIUS
 
 ROLLING = 1.0
 """m/s^2 by which a football slows on turf (FIFA's test of pitches: 4 to 8 m from a ramp 1 m high)."""
-
 _GRAVITY, _BOUNCE = 9.81, 0.55
 _ON_GROUND = 0.03  # metres above its radius at which a ball still counts as rolling
 _LEAST_HOP = 0.02  # metres; a lower hop is a roll

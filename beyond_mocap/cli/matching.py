@@ -117,7 +117,7 @@ def add_touches(verbs):
 
 def run_touches(options, told: Told, writers: Mapping[str, Writer]) -> None:
     """`touches`: solves the ball and writes what was asked for."""
-    from ..ball.solve_ball import solve_ball
+    from ..ball.tracked.solve import solve_ball
     from ..files.tables import write_ball, write_report, write_touches
     from ..motion.track.ball_path import BallPath
 

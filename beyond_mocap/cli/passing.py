@@ -113,7 +113,7 @@ def _of_player(player) -> dict:
 def _write(folder: Path, played, table: list[dict], report: dict) -> None:
     from ..files.bvh import bvh
     from ..files.tables import write_ball, write_report
-    from ..passes.strikes_csv import write_strikes
+    from ..passes.scene_json import write_strikes
     from ..synthesis.provenance import write_provenance
 
     folder.mkdir(exist_ok=True)

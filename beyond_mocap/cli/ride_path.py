@@ -16,7 +16,7 @@ from ..base.settings.options import add_options, option_values
 from .outputs import Told, Writer, build_take, check_outputs, naming, writer_of
 
 if TYPE_CHECKING:
-    from ..path_editing.follower import Change, Follower
+    from ..path_editing.detour import Change, Follower
     from ..path_editing.ride import Ridden, RideSettings, RideSource
 
 _WHOLE = 0.95  # of a path, that is as good as all of it
@@ -105,7 +105,7 @@ def _write_tables(options, take, report: dict | None) -> None:
 def _path(options):
     """The new path."""
     from ..path_editing import path_line
-    from ..path_editing.path_csv import read_curve
+    from ..path_editing.path_line import read_curve
 
     points = read_curve(options.path)
     with naming(options.path):
@@ -181,7 +181,7 @@ def _report(source, ridden, take, path, ground) -> dict:
 def _read_others(paths: Sequence[Path]) -> list[Follower]:
     """The bodies of other recordings, which stay where they are; second 0 is their first frame."""
     from ..files.bvh import bvh
-    from ..path_editing.follower import Follower
+    from ..path_editing.detour import Follower
 
     motions = [(path.name, bvh.read(path).motion) for path in paths]
     return [
@@ -213,7 +213,7 @@ def _keep_clear(
 
 
 def _build_follower(name: str, ridden: Ridden) -> Follower:
-    from ..path_editing.follower import Follower
+    from ..path_editing.detour import Follower
 
     times = np.arange(len(ridden.motion)) / ridden.motion.fps
     return Follower(name=name, times=times,

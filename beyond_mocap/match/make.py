@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..ball.solve_ball import solve_ball
-from ..ball.tracked.solve import SolvedBall
+from ..ball.tracked.solve import SolvedBall, solve_ball
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.event_data import MatchEvents
 from ..files.events import read_events

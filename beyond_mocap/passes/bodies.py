@@ -45,20 +45,15 @@ from ..synthesis.search.path_search import PathSearch
 from ..synthesis.search.wanted import Wanted, WantedKey
 from ..synthesis.synthesize import look_of
 from ..synthesis.take import Take
-from .alike import alike
-from .links import BoneWeights
-from .orders import HitOrder, Stance
-from .way import Placed, needed, placed, way
+from .links import BoneWeights, weigh_bones
+from .way import HitOrder, Placed, Stance, needed, placed, way
 
 TRANSITION = 0.4
 """Seconds over which one piece of clip gives way to the next."""
-
 FASTER = 1.15
 """Times the library's highest speed that a player may go without being told."""
-
 OWN_HEAD = 0.3
 """Seconds around a header in which the head moves as recorded; it goes over within as many more."""
-
 _PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # "hand" itself is no label
 _WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
 
@@ -87,30 +82,21 @@ class PlayerMotion:
     warnings: tuple[str, ...]
 
 
-def player_motion(
-    library: Library,
-    stance: Stance,
-    orders: Sequence[HitOrder],
-    ball: BallPath,
-    ball_radius: float = BALL_RADIUS,
-    frames: int | None = None,
-    fps: float = 30.0,
-    settings: BodySettings = BodySettings(),
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> PlayerMotion:
+def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], ball: BallPath,
+                  ball_radius: float = BALL_RADIUS, fps: float = 30.0, settings: BodySettings = BodySettings(),
+                  progress: Callable[[float, str], None] | None = None,
+                  cancelled: Callable[[], bool] | None = None) -> PlayerMotion:
     """The motion of a player who begins at `stance` and strikes as `orders` say.
 
-    ball: its path at `fps` over the whole scene, whose first time is the motion's; frames: how many (all of the
-    ball's). The same input gives the same bits. InputError for orders outside the scene or two at once; Cancelled.
+    ball: its path at `fps` over the whole scene, which is the motion's. The same input gives the same bits. InputError
+    for orders outside the scene or two at once; Cancelled.
     """
     from threadpoolctl import threadpool_limits
 
-    count = len(ball.times) if frames is None else frames
     orders = sorted(orders, key=lambda order: order.time)
     _check(orders, ball.times, fps)
     with threadpool_limits(limits=1):
-        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=count, fps=fps,
+        return _Body(library, stance, orders, ball=ball, ball_radius=ball_radius, count=len(ball.times), fps=fps,
                      settings=settings).made(progress, cancelled)
 
 
@@ -164,7 +150,7 @@ class _Body:
         count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
         order = self._wanted(self.start + np.arange(count) / self.library.fps)
         half = int(round(0.5 * self.settings.transition * self.library.fps))
-        measure = Alike(alike(self.library, self.settings.weights), tuple(sorted({-half, half})))
+        measure = Alike(weigh_bones(self.library, self.settings.weights), tuple(sorted({-half, half})))
         edit = PathSearch(
             self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled,
             alike=measure,
@@ -175,19 +161,17 @@ class _Body:
         asked = self._plan(track)
         plan = resolve_plan(asked, self.library)
         report(0.75, "Laying out")
-        planted, taken = Construction(
-            library=self.library, plan=plan, track=track, source=source, touches=self._touches(),
-            heading=self._heading(track, path.facing, source), planned=True,
-        ).lay_out()
+        planted, taken = Construction(library=self.library, plan=plan, track=track, source=source,
+                                      touches=self._touches(), heading=self._heading(track, path.facing, source),
+                                      planned=True).lay_out()
         body = Motion(self.library.skeleton, planted.root, planted.rotations, self.fps)
         body = self._watching(body)
         struck = met_at(body, taken.standing.any(axis=2), self._meetings())
         ball = BallPath(self.times, self.ball, np.ones(len(self.times), bool))
-        take = Take(
-            **provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
-            contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path", seed=self.settings.seed,
-            correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped, plan=asked, edit=edit,
-        )
+        take = Take(**provenance_fields(self.library, source), motion=struck.motion, start_time=self.start,
+                    contacts=taken.contacts, timeline=Timeline(), keys=(), ball=ball, method="path",
+                    seed=self.settings.seed, correction=planted.correction, ik_miss=planted.miss, stepped=taken.stepped,
+                    plan=asked, edit=edit)
         report(1.0, "Done")
         return PlayerMotion(take=take, gaps=struck.gap, moved=struck.moved, warnings=self._warnings(struck, track))
 
@@ -222,19 +206,16 @@ class _Body:
         path = way(self.stance, self.hits, times)
         velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
         ball = interpolate(times, self.times, self.ball)
-        track = SampledTrack(
-            times=times, positions=path.positions, raw=path.positions, velocity=velocity,
-            speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
-            valid=np.ones(len(times), bool), ball=ball, ball_measured=np.ones(len(times), bool), fps=float(fps),
-        )
+        track = SampledTrack(times=times, positions=path.positions, raw=path.positions, velocity=velocity,
+                             speed=np.linalg.norm(velocity, axis=1), direction=travel_direction(velocity, fps),
+                             valid=np.ones(len(times), bool), ball=ball, ball_measured=np.ones(len(times), bool),
+                             fps=float(fps))
         return track, path
 
     def _plan(self, track: SampledTrack) -> Plan:
         """What stands in a take's plan: the little track."""
-        return Plan(
-            track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
-            seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False,
-        )
+        return Plan(track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
+                    seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False)
 
     def _heading(self, track: SampledTrack, kept: np.ndarray, source: Footage) -> np.ndarray:
         """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
@@ -257,10 +238,8 @@ class _Body:
     def _touches(self) -> list[Touch]:
         """The hit motions as stretches in which no steps are added."""
         return [
-            Touch(
-                (hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
-                (hit.end - hit.order.time) * self.fps,
-            ) for hit in self.hits
+            Touch((hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
+                  (hit.end - hit.order.time) * self.fps) for hit in self.hits
         ]  # fmt: skip
 
     def _watching(self, body: Motion) -> Motion:

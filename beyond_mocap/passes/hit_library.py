@@ -78,11 +78,9 @@ class HitLibrary:
     def _arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Size (H,) m, greatest speed (H,) m/s, ways (H, 4, 3) m and times (H, 4) s."""
         hits = [one.hit for one in self.hits]
-        return (
-            np.array([hit.size for hit in hits]), np.array([hit.max_speed for hit in hits]),
-            np.array([hit.vectors for hit in hits]).reshape(-1, 4, 3),
-            np.array([hit.times for hit in hits]).reshape(-1, 4),
-        )
+        return (np.array([hit.size for hit in hits]), np.array([hit.max_speed for hit in hits]),
+                np.array([hit.vectors for hit in hits]).reshape(-1, 4, 3),
+                np.array([hit.times for hit in hits]).reshape(-1, 4))
 
     @cached_property
     def sides(self) -> np.ndarray:
@@ -99,9 +97,8 @@ class HitLibrary:
         """Toss, pass or attack, by the greatest speed (§5)."""
         return tuple(KINDS[int(np.searchsorted(_bounds(self.part), speed, "right"))] for speed in self.speeds)
 
-    def match(
-        self, example: HitMotion, weights: MatchWeights = MatchWeights(), side: str | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def match(self, example: HitMotion, weights: MatchWeights = MatchWeights(),
+              side: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """How much each hit motion differs from an example (eq. 2), and their order.
 
         side: only hit motions of this side (None: all). Returns (order (K,), most alike first, indices into `hits`;
@@ -164,9 +161,8 @@ def _unseen(clip: Clip, part: str, sides, hits: list[HitMotion], tool: Tool | No
         if row.key is None or any(hit.first < row.key < hit.last and _names(row.words, part, hit.side) for hit in hits):
             continue
         named = [side for side in sides if _names(row.words, part, side)]
-        made = [hit_at(
-            clip.recording, int(round(row.key)), _around(row, clip), part=part, side=side, tool=tool,
-        ) for side in named]
+        made = [hit_at(clip.recording, int(round(row.key)), _around(row, clip), part=part, side=side,
+                       tool=tool) for side in named]
         found += [hit for hit in sorted(made, key=lambda hit: -hit.max_speed)[:1] if hit.max_speed > _MOVES]
     return found
 

@@ -104,14 +104,8 @@ class Hits:
         return max(self.motions, key=lambda one: one.max_speed, default=None)
 
 
-def analyse(
-    motion: Motion,
-    part: str = "foot",
-    side: str = "right",
-    threshold: float | None = None,
-    joint: str | None = None,
-    tool: Tool | None = None,
-) -> Hits:
+def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
+            joint: str | None = None, tool: Tool | None = None) -> Hits:
     """Where `part` of one side can strike a ball.
 
     part: "foot", "head", "chest", "hand", "tool" (held in that side's hand), or a joint's name. side: "left" or
@@ -147,9 +141,8 @@ def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = Non
     return max(found, key=lambda hit: hit.max_speed, default=None)
 
 
-def hit_at(
-    motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right", tool: Tool | None = None
-) -> HitMotion:
+def hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right",
+           tool: Tool | None = None) -> HitMotion:
     """The hit motion of a strike whose frame is known, within `span` (first, last): also of parts that neither rise nor
     are fast, as in a trap, of which `analyse` sees nothing. InputError as there."""
     _check(motion, None)
@@ -163,9 +156,8 @@ def hit_at(
     return _hit_motion(part, side, (first, last), way=_Way.of(place, body, part, motion.fps), body=body, key=key)
 
 
-def strike_place(
-    skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str, tool: Tool | None = None
-) -> np.ndarray:
+def strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
+                 tool: Tool | None = None) -> np.ndarray:
     """(..., 3) m, world: the middle of the striking part, from joint positions (..., J, 3) m and world rotations
     (..., J, 4). InputError where the skeleton lacks it."""
     return np.mean(striking_surface(skeleton, part, side, tool).line(positions, rotations), axis=0)
@@ -304,9 +296,8 @@ def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.
     return way.speed[key] > min(3.0 * (pace + 0.5), 2.3 * pace + 2.5)
 
 
-def _hit_motion(
-    part: str, side: str, span: tuple[int, int], way: _Way, body: _Body, key: int | None = None
-) -> HitMotion:
+def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _Body,
+                key: int | None = None) -> HitMotion:
     first, last = span
     key = first + int(np.argmax(way.speed[first : last + 1])) if key is None else key
     high = _high(way.height, first, key, last)

@@ -1,19 +1,28 @@
-"""Poses as each body sees itself, and what differences between them weigh (Ball handling §4 eq. 1): the root stands
-over the origin and faces X."""
+"""Poses as each body sees itself, and how alike every two frames of a library are (Ball handling §4 eq. 1).
+
+The root stands over the origin and faces X. A player of a passing scene may leave any clip for any other between two
+strikes, and the path search weighs how alike the poses are against where the player has to go; so it gets eq. 1's poses
+of all frames: positions and velocities of the main bones, times their weights.
+"""
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..base.errors import InputError
+from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, pose_kinematics
+from . import kept
+from .pass_scene import BONES
 
-BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
 _FINE = 60.0
+
+_known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -50,9 +59,35 @@ def _bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     places, _ = pose_kinematics(motion.skeleton, root, local)
     body = identify(motion.skeleton)
     chest = body.chest
-    joints = [
-        body.hips, chest if body.head is None else body.head,
-        *(chest if limb.hand is None else limb.hand for limb in (body.left, body.right)),
-        body.left.toe_or_foot, body.right.toe_or_foot,
-    ]
+    joints = [body.hips, chest if body.head is None else body.head,
+              *(chest if limb.hand is None else limb.hand for limb in (body.left, body.right)), body.left.toe_or_foot,
+              body.right.toe_or_foot]
     return places[:, joints], heading_from_positions(motion.skeleton, places)
+
+
+def weigh_bones(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
+    """(N, 12, 3) float32 of the library's N frames: the sum of the distances of two frames' rows is eq. 1, over the sum
+    of the usual weights of positions, so that it is about the distance in m of one bone. Kept beside the library's
+    cache."""
+    scale = sum(BoneWeights().position)
+    measure = np.array([*weights.position, *weights.velocity]) / scale
+    return measure_bones(library) * measure.astype(np.float32)[:, None]
+
+
+def measure_bones(library: Library) -> np.ndarray:
+    """(N, 12, 3) float32: positions m, then velocities m/s, of `links.BONES` at every frame of the library."""
+    if library not in _known:
+        arrays = kept.load(library, "bones")
+        if arrays is None or len(arrays["bones"]) != len(library.frames):
+            arrays = {"bones": _measured(library)}
+            kept.save(library, "bones", arrays)
+        _known[library] = arrays["bones"]
+    return _known[library]
+
+
+def _measured(library: Library) -> np.ndarray:
+    frames = library.frames
+    parts = []
+    for clip, first, count in zip(library.clips, frames.first, frames.count):
+        parts.append(np.concatenate(aligned(clip.motion, frames.source[first : first + count]), axis=1))
+    return np.concatenate(parts).astype(np.float32)

@@ -23,20 +23,17 @@ from ..motion.track.ball_path import BallPath
 from .bodies import BodySettings, least_seconds, player_motion
 from .hit_library import kind_of
 from .hits import HitMotion
-from .orders import Stance
 from .pass_plan import PassPlan
 from .pass_scene import GROUND, Example, Pass, PassScene
 from .passes import ball_of, ball_path, bone_weights, planned
+from .way import Stance
 
 LONG = 60.0
 """Seconds that everybody goes on standing, if nobody acts."""
-
 FADE = 0.4
 """Seconds over which what somebody did gives way to what he does now."""
-
 AHEAD = 0.6
 """Metres from the holder to the ball at first."""
-
 _TAIL, _SWAY = 4.0, 2.5
 _STOPPED = 1.2
 _ROUNDS = 2
@@ -78,9 +75,8 @@ class Rally:
         for name, motion in piece.motions.items():
             players[name] = _going_on(self.players[name], motion, at)
         ball = _on_from(self.ball, piece.ball, at)
-        return replace(
-            self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds, passes=self.passes + 1
-        )
+        return replace(self, holder=piece.receiver, players=players, ball=ball, free=at + piece.seconds,
+                       passes=self.passes + 1)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -112,22 +108,14 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
         if progress:
             progress(number / len(names), f"{player.name} stands")
         stance = Stance(player.place, scene.facing(player.name))
-        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, frames=None, fps=scene.fps,
+        moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                               settings=_settings(scene), cancelled=cancelled)
         players[player.name] = Played(start, _lasting(moved.take.motion))
     return Rally(scene=scene, holder=holder, players=players, ball=_on_from(None, ball, start), start=start, free=start)
 
 
-def answer(
-    library: Library,
-    rally: Rally,
-    now: float,
-    hit: HitMotion,
-    target: str,
-    bounces: int = 0,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Piece:
+def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
+           progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> Piece:
     """The pass with which the holder answers a hit of the user: the library's most alike motion (eq. 2), to `target`.
 
     now: s, when all stand. InputError for a target that is nobody or the holder himself, or out of reach; NotInLibrary
@@ -135,9 +123,8 @@ def answer(
     """
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
-    one = Pass(
-        rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side, example=Example("", hit=hit)
-    )
+    one = Pass(rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side,
+               example=Example("", hit=hit))
     scene = replace(
         rally.scene, passes=(one,), repeat=1, missed=0.0, dropped=0.0, lead_in=0.0, lead_out=_TAIL, serve=GROUND,
         players=tuple(
@@ -151,7 +138,7 @@ def answer(
     motions = {}
     for name in (one.giver, one.receiver):
         moved = player_motion(library, stances[name], plan.orders(name), ball=path, ball_radius=ball_of(scene).radius,
-                              frames=None, fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
+                              fps=scene.fps, settings=_settings(scene), cancelled=cancelled)
         motions[name] = _lasting(moved.take.motion)
     strikes = plan.strikes
     clip = library.clips[strikes[0].order.clip].path
@@ -236,7 +223,5 @@ def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:
         return BallPath(times, places, np.ones(len(times), bool), turns)
     kept = before.times < at - 0.5 * step
     turns = quaternion.multiply(turns, before.rotations[kept][-1] if kept.any() else quaternion.identity(1)[0])
-    return BallPath(
-        np.concatenate([before.times[kept], times]), np.concatenate([before.positions[kept], places]),
-        np.ones(int(kept.sum()) + len(times), bool), np.concatenate([before.rotations[kept], turns]),
-    )
+    return BallPath(np.concatenate([before.times[kept], times]), np.concatenate([before.positions[kept], places]),
+                    np.ones(int(kept.sum()) + len(times), bool), np.concatenate([before.rotations[kept], turns]))

@@ -19,36 +19,19 @@ from ..ball.contact import in_world
 from ..base.errors import InputError
 from ..base.vectors import arctan2, unit_vectors
 from ..motion import quaternion
-from .pass_costs import (
-    TIMES,
-    TRUNK_TO,
-    UPRIGHT,
-    against_the_part,
-    arrivals,
-    cost_of_moments,
-    lasting,
-    misses,
-    rising,
-    spun,
-    through_body,
-    ways_of,
-    wished,
-)  # fmt: skip
-from .pass_court import ON_TARGET, Court, Link, Natural, Site, turned
+from . import pass_court
+from .pass_court import Court, Link, Natural, Site
 from .pass_scene import GROUND, RECEIVE, Pass
-from .strike_moments import StrikeMoments, launched_from
+from .strike_choice import StrikeMoments, launched_from
 
 TURNS = np.radians([0.0, 20.0, -20.0, 40.0, -40.0])
 """Radians by which a body may face beside where its motion sends the ball by itself."""
-
 EIGHTH = 0.25 * np.pi  # rad: an eighth of a whole turn
 MOST_OPTIONS, MOST_OF_A_HIT, MOST_TIMES = 8, 2, 4
 CHANCE, AGAIN = 0.4, 0.6
 """m/s by which chance tells hit motions apart that are as good, and what each use before by the same player costs."""
-
 SHORTEST, LONGEST, PER_BOUNCE, TRIED = 0.4, 2.6, 0.5, 16
 """Seconds of travel that are tried, from the shortest to the longest, which is longer for each bounce, and how many."""
-
 LIES = 0.2
 """Metres above where a ball lies on the ground up to which a foot's strike may be at a ball that lies there."""
 
@@ -124,11 +107,12 @@ def _options(court: Court, number: int, site: Site, used: dict, random: np.rando
     toward = court.toward(number)
     moments, facing = _faced(court, _possible(court, number, site), site, toward)
     starts, velocities = launched_from(moments, site.place, facing, court.ball.radius)
-    cost = cost_of_moments(moments, facing, court.whence(number) - site.place)
+    cost = pass_court.cost_of_moments(moments, facing, court.whence(number) - site.place)
     if site.asked is None:
         cost += 0.3 * np.linalg.norm(velocities, axis=1)
     else:
-        cost += misses(*courses(starts, velocities, None, court.ball, TIMES), toward, site.asked.bounces)
+        ways = courses(starts, velocities, None, court.ball, pass_court.TIMES)
+        cost += pass_court.misses(*ways, toward, site.asked.bounces)
     keys = [(site.player, moments.hits[which].clip, moments.hits[which].hit.first) for which in moments.which]
     chance = dict(zip(sorted(set(keys)), random.uniform(0.0, CHANCE, len(set(keys)))))
     cost += np.array([chance[key] + AGAIN * used.get(key, 0) for key in keys])
@@ -188,26 +172,26 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # what is not possible may be faster than numbers go
-def _tried(
-    court: Court, number: int, options: _Options, after: Link, option: np.ndarray, seconds: np.ndarray
-) -> _Tried:
+def _tried(court: Court, number: int, options: _Options, after: Link, option: np.ndarray,
+           seconds: np.ndarray) -> _Tried:
     """Flights from `option` (N,) that take `seconds` (N,), and what each costs."""
     site, one, receiver = court.sites[number], court.passes[number], court.sites[number + 1]
-    natural = wished(options.velocities(), site.kind)
+    natural = pass_court.wished(options.velocities(), site.kind)
     starts = options.centres(site, unit_vectors(natural), court.ball.radius)[option]
     target = court.ball_on(number + 1, after, unit_vectors(-natural[0] * [1.0, 1.0, 0.0]))
-    spin = spun(starts, target, seconds, court.ball, site.kind)
+    spin = pass_court.spun(starts, target, seconds, court.ball, site.kind)
     aimed = aim(starts, target, court.ball, seconds=seconds, bounces=one.bounces, spin=spin,
                 fastest=court.fastest(number))
     flights = (starts, aimed.velocity, spin, seconds)
-    ways, arriving = ways_of(*flights, court.ball), arrivals(*flights, court.ball)
+    ways, arriving = pass_court.ways_of(*flights, court.ball), pass_court.arrivals(*flights, court.ball)
     cost = options.cost[option] + np.linalg.norm(aimed.velocity - natural[option], axis=1)
     cost += court.in_the_way(number, ways).max(axis=1, initial=0.0)
     for near in (site, receiver):
-        cost += through_body(ways, court.ball.radius, near.place, near.size * TRUNK_TO.get(near.part, UPRIGHT))
-    cost += against_the_part(arriving, after.velocity, _pushes(receiver, after))
-    cost += rising(arriving) + lasting(seconds, site.kind)
-    good = aimed.possible & (aimed.miss <= ON_TARGET)
+        tall = near.size * pass_court.TRUNK_TO.get(near.part, pass_court.UPRIGHT)
+        cost += pass_court.through_body(ways, court.ball.radius, near.place, tall)
+    cost += pass_court.against_the_part(arriving, after.velocity, _pushes(receiver, after))
+    cost += pass_court.rising(arriving) + pass_court.lasting(seconds, site.kind)
+    good = aimed.possible & (aimed.miss <= pass_court.ON_TARGET)
     cost = np.where(good & court.clear(ways), cost, np.inf)
     return _Tried(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
                   reached=bool(good.any()))
@@ -216,7 +200,7 @@ def _tried(
 def _pushes(site: Site, link: Link) -> np.ndarray:
     """(3,): the way in which the part pushes the ball: as it moves; who receives gives way, and has it before him."""
     own = [0.8, 0.0, 0.6] if site.kind == RECEIVE else link.moment.struck.velocity[0]
-    return turned(np.array([own]), link.facing)[0]
+    return pass_court.turned(np.array([own]), link.facing)[0]
 
 
 def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
@@ -233,7 +217,7 @@ def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
     free = aim(tried.starts[:1], tried.target, court.ball, seconds, one.bounces)
     speed, fastest = float(np.linalg.norm(free.velocity[0])), court.fastest(number)
     found, expected = f"no way of {far:.1f} m{within} with {bounces}", f"one that a human can give by {part}"
-    if free.miss[0] <= ON_TARGET and speed > fastest:
+    if free.miss[0] <= pass_court.ON_TARGET and speed > fastest:
         found = f"{far:.1f} m away{within} with {bounces} takes {speed:.0f} m/s"
         expected = f"up to {fastest:.0f} m/s by {part}"
     return InputError(court.name(number), found, expected, "move them nearer, or change bounces or seconds")

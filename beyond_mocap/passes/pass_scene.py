@@ -22,28 +22,20 @@ GROUND = "ground"
 LEAST_APART = 0.5
 """Metres between two players' places."""
 _DEFAULTS = defaults("passes")
-_ROWS = (
-    *(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
-    *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"),
-)  # fmt: skip
-LIMITS = {
-    **{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
-    "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1),
-}  # fmt: skip
+_ROWS = (*(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
+         *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"))
+LIMITS = {**{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
+          "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1)}
 """Least and most of a scene's numbers."""
 MOST_PASSES, MOST_PLAYERS = 1000, 100
 BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
-"""Bones whose weights in eq. 1 can be set (`links.BONES`)."""
-
+"""Bones that poses are compared by in eq. 1, and whose weights can be set."""
 RESERVED = ("ball", "strikes", "scene")
 """Names that other files of a scene have."""
-
 LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
 """Metres that a tool in the hand has at most."""
-
 FAR = 100.0
 """Metres between two players, above which nobody passes."""
-
 Place = tuple[float, ...]
 
 

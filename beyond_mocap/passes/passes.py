@@ -26,16 +26,14 @@ from .bodies import BodySettings, PlayerMotion, least_seconds, player_motion
 from .hit_library import MatchWeights
 from .hits import HitMotion, strongest
 from .links import BoneWeights
-from .orders import HitOrder, Stance
 from .pass_court import Site
 from .pass_plan import PassPlan, plan_passes
 from .pass_scene import BONES, Pass, PassScene, Player, Weights
-from .strike_choice import Choice, unsaid
-from .strike_moments import StrikeMoments, strike_moments
+from .strike_choice import Choice, StrikeMoments, strike_moments, unsaid
+from .way import HitOrder, Stance
 
 MOST_HITS = 24
 """Hit motions that are looked at for one strike, those that suit its kind best."""
-
 BALL_LIMITS: dict[str, Any] = {
     **{name: (setting("passes", name).least, setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
@@ -43,10 +41,8 @@ BALL_LIMITS: dict[str, Any] = {
     "rolling": (0.01, 20.0), "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
 """Least and most of a ball's numbers."""
-
 PLANNED = 0.3
 """Share of the whole work after which the plan stands."""
-
 _SIDED = ("foot", "hand", "tool")
 
 
@@ -80,12 +76,8 @@ class Passes:
         return float(next(player for player in self.players if player.name == one.player).gaps[own])
 
 
-def passes(
-    library: Library,
-    scene: PassScene,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> Passes:
+def passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+           cancelled: Callable[[], bool] | None = None) -> Passes:
     """The scene played with the motions of a library. The same scene and library give the same bits.
 
     InputError for a part that the skeleton lacks, and for passes that no human can give; NotInLibrary where nothing in
@@ -128,12 +120,8 @@ def _part_of(report, number: int, players: tuple[Player, ...]):
     return told
 
 
-def planned(
-    library: Library,
-    scene: PassScene,
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> PassPlan:
+def planned(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
+            cancelled: Callable[[], bool] | None = None) -> PassPlan:
     """Strikes and flights of a scene alone, for live editing. Errors as for `passes`."""
     scene = _with_chance(scene)
     ball = ball_of(scene)
@@ -298,9 +286,8 @@ def _needs(library: Library, sizes: dict[str, float]):
 # -- the bodies
 
 
-def _played(
-    library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress, cancelled
-) -> PlayerMotion:
+def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
+            cancelled) -> PlayerMotion:
     """One player's motion in his own size; the work is done in the library's."""
     size = size_of(player, library)
     orders = [_sized(order, size) for order in plan.orders(player.name)]
@@ -308,7 +295,7 @@ def _played(
     ball = path if size == 1.0 else replace(path, positions=path.positions / size)
     settings = BodySettings(scene.transition, scene.watch, scene.seed, bone_weights(scene.weights))
     moved = player_motion(library, stance, orders, ball=ball, ball_radius=ball_of(scene).radius / size,
-                          frames=len(path.times), fps=scene.fps, settings=settings, progress=progress,
+                          fps=scene.fps, settings=settings, progress=progress,
                           cancelled=cancelled)  # fmt: skip
     if size == 1.0:
         return moved

@@ -1,11 +1,13 @@
-"""SCENE.json: a passing scene as a file (docs/passes/passes.md)."""
+"""The files of a passing scene (docs/passes/passes.md): SCENE.json, samples of it, and the strikes as a table."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import math
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, replace
 from typing import Any
 
@@ -13,12 +15,61 @@ from ..ball.contact import Tool
 from ..base.errors import InputError
 from ..files.content import utf8
 from ..files.json_values import check_names, check_object, number, numbers, object_of, shown, text, truth, whole_number
+from ..files.whole import atomic_write
 from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
 """Bytes of a file above which it is no scene."""
-
 _OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
+
+SAMPLES: dict[str, dict] = {
+    "three": {
+        "players": [{"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
+                    {"name": "Cho", "place": [2.8, -1.6]}],
+        "passes": [{"from": "Ann", "to": "Ben", "kind": "pass"}, {"from": "Ben", "to": "Cho", "kind": "toss"},
+                   {"from": "Cho", "to": "Ann", "kind": "attack"}],
+        "repeat": 3,
+        "seed": 3,
+    },
+    "six": {
+        "players": [{"name": "Ann", "place": [4.2, 0.0]}, {"name": "Ben", "place": [2.1, 3.7]},
+                    {"name": "Cho", "place": [-2.1, 3.7]}, {"name": "Dia", "place": [-4.2, 0.0]},
+                    {"name": "Eli", "place": [-2.1, -3.7]}, {"name": "Fay", "place": [2.1, -3.7]}],
+        "passes": [{"from": "Ann", "to": "Cho", "kind": "pass"}, {"from": "Cho", "to": "Dia", "kind": "toss"},
+                   {"from": "Dia", "to": "Fay", "kind": "attack"}, {"from": "Fay", "to": "Ben", "kind": "pass"},
+                   {"from": "Ben", "to": "Eli", "kind": "pass"}, {"from": "Eli", "to": "Ann", "kind": "pass"}],
+        "repeat": 2,
+    },
+    "volley_net": {
+        "players": [{"name": "Ann", "place": [-2.2, 1.6]}, {"name": "Ben", "place": [-4.0, -1.6], "part": "head"},
+                    {"name": "Cho", "place": [2.4, -1.4]}, {"name": "Dia", "place": [4.2, 1.8]}],
+        "passes": [{"from": "Ann", "to": "Ben", "kind": "toss"}, {"from": "Ben", "to": "Cho", "kind": "pass"},
+                   {"from": "Cho", "to": "Dia", "kind": "toss"}, {"from": "Dia", "to": "Ann", "kind": "attack"}],
+        "defaults": {"bounces": 0},
+        "repeat": 2,
+        "ball": "volleyball",
+        "net": {"from": [0.0, -4.5], "to": [0.0, 4.5], "height": 1.5},
+    },
+    "racquet": {
+        "players": [{"name": "Ann", "place": [-6.5, 0.6], "part": "tool", "side": "right"},
+                    {"name": "Ben", "place": [6.5, -0.6], "part": "tool", "side": "right"}],
+        "passes": [{"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Ann"}],
+        "repeat": 3,
+        "ball": "tennis",
+        "net": {"from": [0.0, -5.0], "to": [0.0, 5.0], "height": 0.95},
+        "serve": "Ben",
+    },
+    "dropped": {
+        "players": [{"name": "Ann", "place": [0.0, 3.2]}, {"name": "Ben", "place": [-2.8, -1.6]},
+                    {"name": "Cho", "place": [2.8, -1.6]}],
+        "passes": [{"from": "Ann", "to": "Ben"}, {"from": "Ben", "to": "Cho"}, {"from": "Cho", "to": "Ann"},
+                   {"from": "Ann", "to": "Ben", "error": "dropped"}],
+        "lead_out": 2.5,
+    },
+}
+
+COLUMNS = ("time_s", "frame", "player", "kind", "part", "side", "clip", "clip_frame", "mirrored", "x_m", "y_m", "z_m",
+           "speed_in_m_s", "speed_out_m_s", "travel_s", "bounces", "facing_deg", "contact_gap_m", "outcome")
 
 
 def read_scene(path: str | os.PathLike) -> PassScene:
@@ -91,12 +142,10 @@ def _pass_out(one: Pass) -> dict:
 
 
 def _scene(whole) -> PassScene:
-    read: dict[str, Callable] = {
-        "players": _list_of(_player), "repeat": whole_number, "fps": number, "seed": whole_number, "ball": _ball,
-        "net": _net, "serve": _serve, "transition": number, "lead_in": number, "lead_out": number,
-        "directions": whole_number,
-        "watch": truth, "weights": _weights,
-    }  # fmt: skip
+    read: dict[str, Callable] = {"players": _list_of(_player), "repeat": whole_number, "fps": number,
+                                 "seed": whole_number, "ball": _ball, "net": _net, "serve": _serve,
+                                 "transition": number, "lead_in": number, "lead_out": number,
+                                 "directions": whole_number, "watch": truth, "weights": _weights}
     known = {*read, "passes", "defaults", "errors"}
     check_names(whole, "the scene", known, ("players", "passes"))
     found = {name: of(whole[name], name) for name, of in read.items() if name in whole}
@@ -106,10 +155,8 @@ def _scene(whole) -> PassScene:
 
 
 def _player(value, where: str) -> Player:
-    read: dict[str, Callable] = {
-        "name": text, "place": _place, "facing": _angle, "part": text, "side": text, "tool": _tool,
-        "height": number,
-    }  # fmt: skip
+    read: dict[str, Callable] = {"name": text, "place": _place, "facing": _angle, "part": text, "side": text,
+                                 "tool": _tool, "height": number}
     check_names(value, where, read, ("name", "place"))
     return Player(**{name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value})
 
@@ -123,10 +170,8 @@ def _pass(value, where: str, usual: Mapping) -> Pass:
 
 def _settings(value, where: str) -> dict:
     """What a pass may say beside its players."""
-    read = {
-        "kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
-        "example": _example, "error": text,
-    }  # fmt: skip
+    read = {"kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
+            "example": _example, "error": text}
     check_names(value, where, read, ())
     return {name: of(value[name], f"{where}: {name}") for name, of in read.items() if name in value}
 
@@ -212,3 +257,21 @@ def _place(value, where: str) -> tuple[float, float]:
 
 def _triple(value, where: str) -> tuple[float, float, float]:
     return numbers(value, where, 3, "[x, y, z]")
+
+
+def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
+    """Writes one row for each strike, in their order; a strike has every one of COLUMNS, None for an empty cell."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for one in strikes:
+        writer.writerow([_cell(one[name]) for name in COLUMNS])
+    atomic_write(path, out.getvalue())
+
+
+def _cell(value) -> str:
+    if isinstance(value, bool):
+        return str(int(value))
+    if isinstance(value, float):
+        return "" if value != value else f"{value:.6g}"
+    return "" if value is None else str(value)

@@ -1,44 +1,78 @@
-"""Where a player of a passing scene goes: as recorded around each of his hit motions, and between them quietly to where
-the next one begins.
+"""What a passing scene asks of one body (where it stands; when, where and how it strikes), and where the player goes:
+as recorded around each hit motion, and between them quietly to where the next one begins.
 
 A hit motion is laid so that its strike is at the ordered place and facing; its recorded run-up and run-out belong to it
-as far as there is time. What is left between two of them is walked as soon as the first one is over, and then he
-stands.
+as far as there is time. What is left between two of them is walked as soon as the first one is over, and then the
+player stands.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..ball.contact import Tool
 from ..base.easing import State, quintic_between
 from ..base.time_series import interpolate
 from ..library.library import Library
 from ..motion import quaternion
 from ..motion.humanoid import heading_from_positions
 from ..motion.motion import at_frames, pose_kinematics
-from .orders import HitOrder, Stance
 
 LEAD, TIMELY = 1.6, 0.4
 """Seconds of run-up and run-out that are taken from the recording at most, and m/s that one of them is worth."""
-
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
-
 CROUCHED, LIFTED = 3.0, 0.25
 """m/s of unrest that a metre below or above the usual height of the hips is, and that a foot in the air is."""
-
 WALK, HASTE = 1.1, 2.2
 """m/s at which he goes from one place to the next where time allows, and where it does not."""
-
 SPEEDING = 1.6
 """m/s^2 at which he comes to rest and sets out."""
-
 _SETTLE = 0.4  # s that setting out and stopping take beside the way itself
 _ROOM = 1.25  # times what he needs, from which on he stands between two hits
 _SHARE = 0.7  # of the time between two hits that run-out and run-up may take
+
+
+if TYPE_CHECKING:
+    from .hits import HitMotion
+
+
+@dataclass(frozen=True)
+class Stance:
+    """Where a player stands and which way he faces: place (2,) m on the ground of his root, facing rad from +x."""
+
+    place: tuple[float, ...]
+    facing: float
+
+
+@dataclass(frozen=True, eq=False)
+class HitOrder:
+    """One strike.
+
+    time: s. clip: index into the library's clips; hit: the hit motion, frames in the clip's own rate; strike_frame: the
+    one that strikes, in that rate. place (2,) m and facing rad: of the root on the ground and of the heading at the
+    strike. ball (3,) m: the ball's centre then; normal (3,): unit, the way from the part to the ball. part, side: of
+    `contact.PARTS` or a joint's name. tool: what is in the hand. kind: toss, pass, attack or receive. touches: whether
+    he meets the ball; who misses it plays on as recorded.
+    """
+
+    time: float
+    clip: int
+    hit: HitMotion
+    strike_frame: float
+    place: tuple[float, ...]
+    facing: float
+    ball: tuple[float, ...]
+    normal: tuple[float, ...]
+    part: str
+    side: str
+    tool: Tool | None = None
+    kind: str = "pass"
+    touches: bool = True
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,7 +185,7 @@ def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[P
 @dataclass(frozen=True, eq=False)
 class Way:
     """positions (T, 2) m of the path without sway; facing (T,) rad within the hit motions, unwrapped the short way
-    round from each to the next, NaN between them; first, last: facing before and after all of them."""
+    round from each to the next, NaN between them."""
 
     positions: np.ndarray
     facing: np.ndarray
@@ -213,4 +247,3 @@ def needed(before: State, after: State) -> float:
     stop, go = stopping(before[2]), stopping(after[2])
     apart = np.linalg.norm(after[1] - 0.5 * after[2] * go - before[1] - 0.5 * before[2] * stop)
     return stop + go + float(apart) / HASTE + _SETTLE
-

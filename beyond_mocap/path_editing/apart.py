@@ -14,8 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .collisions import DISTANCE, HEIGHT, Collision, collisions, collisions_at, least_gaps
-from .detour import RISE, gentle_width
-from .follower import Change, Follower
+from .detour import RISE, Change, Follower, gentle_width
 
 _SPARE = 0.012  # metres kept beyond the distance: bodies move in curves between the search's own times
 _RATE, _FINER = 25.0, 3  # times per second at which the search looks; at the end so many times as often

@@ -2,11 +2,15 @@
 
 The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion begins
 as recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as it takes, and ends as
-recorded. At each jump one stretch gives way to the other for FADE_SECONDS on either side (`loop_fade`).
+recorded. How often, and over which loop, is chosen so that the recorded end falls on the end of the path, with all
+strides made longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it
+kicks), by at most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on
+steadily.
 
-How often, and over which loop, is chosen so that the recorded end falls on the end of the path, with all strides made
-longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it kicks), by
-at most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on steadily.
+At each jump one stretch gives way to the other by a quintic for FADE_SECONDS on either side. Rotations, the place
+beside the path and the height go over from the one's to the other's; of the way along the path the speed is mixed, not
+the place. Where a recording ends within a fade, the difference of both at its end is carried on and dies away with what
+is left of it. A sole that only one stretch sets down does not stand while the fade moves it.
 """
 
 from __future__ import annotations
@@ -16,30 +20,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import InputError
-from .loop_fade import faded, faded_steps, rows, window
+from ..motion import quaternion
+from ..synthesis.construct.cross_fade import faded_rotations, share
 from .loops import Loop, find_loops, smooth_speed
 from .path_frame import Residuals
 
 FADE_SECONDS = 0.2
 """Half a fade, at most; a short loop is faded over its own length."""
-
 MOST_SCALE, KEPT_SCALE = 0.05, 0.009
 """Shares by which strides are made longer or shorter so that the motion's end falls on the path's: where that end is
 worth it, and where the speed is to be kept."""
-
 MOST_FRAMES = 108_000
 """An hour at 30 frames per second."""
-
 SAME_LENGTH = 1e-3
 """Metres that path and motion may differ and count as of one length."""
-
 SEEN = 0.35
 """How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
-
 _ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
 _KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
 _CREEPS = 0.2  # m/s below which a motion stays where it is
 _OTHERS = 3  # times that another loop than the main one is run through, at most
+
+_OWN_SHARE = 0.98  # a sole that stands in one stretch alone stands while that one has at least this share
+_FURTHER = 0.08  # seconds after which a difference that is carried on no longer grows
+_SLOPE_SECONDS = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,8 +146,8 @@ def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:
 
 def _as_long_as_faded(residuals: Residuals, loop: Loop) -> Loop:
     reach = _reach(residuals, (loop,))
-    own = residuals.step[np.clip(window(loop, reach), 1, len(residuals) - 1)]
-    return replace(loop, metres=loop.metres + float(faded_steps(residuals, loop, reach).sum() - own.sum()))
+    own = residuals.step[np.clip(jump_window(loop, reach), 1, len(residuals) - 1)]
+    return replace(loop, metres=loop.metres + float(fade_steps(residuals, loop, reach).sum() - own.sum()))
 
 
 def _exact_end(loops: tuple[Loop, ...], own: float, length: float, most: float) -> tuple[Loop, ...]:
@@ -208,14 +212,14 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     ends = [loop.end for loop in jumps] + [count]
     taken = np.concatenate([np.arange(a, b) for a, b in zip(begins, ends)])
     seams = np.cumsum([b - a for a, b in zip(begins, ends)])[:-1]
-    parts = {name: [values] for name, values in rows(residuals).items()}
+    parts = {name: [values] for name, values in list_rows(residuals).items()}
     for loop in kinds:
-        for name, values in faded(residuals, loop, reach).items():
+        for name, values in fade_jump(residuals, loop, reach).items():
             parts[name].append(values)
     kind = np.array([kinds.index(loop) for loop in jumps])
     around = np.arange(-reach, reach)
     taken[seams[:, None] + around] = count + kind[:, None] * 2 * reach + around + reach
-    source = np.concatenate([np.arange(count), *(window(loop, reach) for loop in kinds)])
+    source = np.concatenate([np.arange(count), *(jump_window(loop, reach) for loop in kinds)])
     values = {name: np.concatenate(each)[taken] for name, each in parts.items()}
     values["frames"] = residuals.frames[source[taken]]
     return residuals.changed(**values), seams
@@ -226,3 +230,144 @@ def _reach(residuals: Residuals, jumps: tuple[Loop, ...]) -> int:
     pieces = [jumps[0].end] + [b.end - a.start for a, b in zip(jumps[:-1], jumps[1:])]
     pieces.append(len(residuals) - jumps[-1].start)
     return max(min(int(round(FADE_SECONDS * residuals.fps)), min(pieces) // 2), 1)
+
+
+def list_rows(residuals: Residuals) -> dict[str, np.ndarray]:
+    """Every array of a motion that can be mixed: all but the numbers of its frames."""
+    return {name: values for name, values in residuals.arrays.items() if name != "frames"}
+
+
+def jump_window(loop: Loop, reach: int) -> np.ndarray:
+    """The frames (2 * reach,) that are shown around a jump where nothing is faded."""
+    around = np.arange(-reach, reach)
+    return np.where(around < 0, loop.end, loop.start) + around
+
+
+def fade_jump(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]:
+    """All `list_rows` of the 2 * reach frames around a jump, faded from the frames around the loop's end to those
+    around its start."""
+    both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
+    after, come = both.around >= 0, both.come
+    shown = list_rows(residuals)
+    shown["turn"] = _since_before(shown["turn"])
+    rotations, standing = shown.pop("rotations"), shown.pop("standing")
+    out = {name: _mixed(*both.values(values), come) for name, values in shown.items()}
+    ending, beginning = both.rotations(rotations)
+    own, other = (np.where(after[:, None, None], *pair) for pair in ((beginning, ending), (ending, beginning)))
+    out["rotations"] = faded_rotations(own, np.arange(2 * reach), other, both.through, after)
+    out["standing"] = _standing(*both.labels(standing), come)
+    out["step"] = fade_steps(residuals, loop, reach)
+    return out
+
+
+def fade_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
+    """(2 * reach,) metres since the frame before, such that the body's speed along the path is the mean of both
+    stretches' speeds although its place in the frame goes over from the one's to the other's."""
+    both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
+    along = residuals.place[:, 0]
+    body = _since_before(residuals.step) + _since_before(np.diff(along, prepend=along[0]))
+    place = _mixed(*both.values(along), both.come)
+    before = along[max(loop.end - reach - 1, 0)]
+    return _mixed(*both.values(body), both.come) - np.diff(place, prepend=before)
+
+
+def _since_before(values: np.ndarray) -> np.ndarray:
+    """Changes (T,) since the frame before, the first frame's guessed from the second's."""
+    return np.concatenate([values[1:2], values[1:]])
+
+
+def _turned(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Rotation vectors (..., 3) radians from rotations (..., 4) to others, as seen from the former."""
+    return quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(before), after))
+
+
+def _mixed(a: np.ndarray, b: np.ndarray, share_of_b: np.ndarray) -> np.ndarray:
+    return a + share_of_b.reshape(-1, *[1] * (a.ndim - 1)) * (b - a)
+
+
+def _standing(a: np.ndarray, b: np.ndarray, come: np.ndarray) -> np.ndarray:
+    """Soles (R, 2, 2) that stand in a fade: those that do in both stretches, and in one while it hardly gives way."""
+    come = come[:, None, None]
+    return (a & b) | (a & (come <= 1.0 - _OWN_SHARE)) | (b & (come >= _OWN_SHARE))
+
+
+@dataclass(frozen=True, eq=False)
+class _Stretches:
+    """The two stretches around a jump, each as far as the motion goes and carried on from there: around (R,) frames
+    from the jump on."""
+
+    count: int
+    loop: Loop
+    around: np.ndarray
+    fps: float
+
+    @property
+    def through(self) -> np.ndarray:
+        """(R,) how far the fade has come, from 0 to 1."""
+        return (self.around - self.around[0]) / len(self.around)
+
+    @property
+    def come(self) -> np.ndarray:
+        """(R,) share of the beginning stretch."""
+        after = self.around >= 0
+        given = share(self.through, after)
+        return np.where(after, 1.0 - given, given)
+
+    @property
+    def _known(self) -> tuple[int, int]:
+        """First and last frame from the jump on of which both stretches have a recording."""
+        return -min(self.loop.start, -int(self.around[0])), min(self.count - 1 - self.loop.end, int(self.around[-1]))
+
+    def _places(self) -> tuple[np.ndarray, ...]:
+        """Frames (R,) of the ending and of the beginning stretch, held at the motion's own ends."""
+        return tuple(np.clip(at + self.around, 0, self.count - 1) for at in (self.loop.end, self.loop.start))
+
+    def _carried(self, apart: np.ndarray, ending: np.ndarray, beginning: np.ndarray) -> np.ndarray:
+        """Differences (R, ...) of both stretches with those beyond the recording carried on from its end; ending and
+        beginning (S, ...): what they change by in each of the S frames before and after the jump."""
+        first, last = (edge - int(self.around[0]) for edge in self._known)
+        over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
+        whole, slope = last - first >= over, ending.mean(axis=0) - beginning.mean(axis=0)
+        out, longest = apart.copy(), _FURTHER * self.fps
+        for edge, inner, beyond in ((first, min(first + over, last), np.arange(first)),
+                                    (last, max(last - over, first), np.arange(last + 1, len(apart)))):
+            near = (apart[edge] - apart[inner]) / (edge - inner) if whole else slope
+            far = np.sign(beyond - edge) * longest * (1.0 - np.exp(-np.abs(beyond - edge) / longest))
+            out[beyond] = apart[edge] + far.reshape(-1, *[1] * (apart.ndim - 1)) * near
+        return out
+
+    @property
+    def _changes(self) -> tuple[np.ndarray, np.ndarray]:
+        """The last frames (S,) before the jump and the first after it, whose changes are known without the other's."""
+        over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
+        return self.loop.end - np.arange(over), self.loop.start + 1 + np.arange(over)
+
+    def values(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values (R, ...) of the ending and of the beginning stretch."""
+        ending, beginning = (np.asarray(values[at], dtype=float) for at in self._places())
+        if self._known == (self.around[0], self.around[-1]):
+            return ending, beginning
+        apart = self._carried(ending - beginning, *(values[at] - values[at - 1] for at in self._changes))
+        first, last = (edge - int(self.around[0]) for edge in self._known)
+        ending[last + 1 :] = beginning[last + 1 :] + apart[last + 1 :]
+        beginning[:first] = ending[:first] - apart[:first]
+        return ending, beginning
+
+    def rotations(self, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rotations (R, J, 4) of the ending and of the beginning stretch."""
+        ending, beginning = (rotations[at].copy() for at in self._places())
+        if self._known == (self.around[0], self.around[-1]):
+            return ending, beginning
+        changes = (_turned(rotations[at - 1], rotations[at]) for at in self._changes)
+        turn = quaternion.from_rotation_vector(self._carried(_turned(beginning, ending), *changes))
+        first, last = (edge - int(self.around[0]) for edge in self._known)
+        ending[last + 1 :] = quaternion.multiply(beginning[last + 1 :], turn[last + 1 :])
+        beginning[:first] = quaternion.multiply(ending[:first], quaternion.inverse(turn[:first]))
+        return ending, beginning
+
+    def labels(self, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Labels (R, 2, 2) of the ending and of the beginning stretch; where one has no recording, the other's."""
+        ending, beginning = (standing[at].copy() for at in self._places())
+        first, last = (edge - int(self.around[0]) for edge in self._known)
+        ending[last + 1 :], beginning[:first] = beginning[last + 1 :], ending[:first]
+        return ending, beginning

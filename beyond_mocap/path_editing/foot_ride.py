@@ -14,22 +14,8 @@ from functools import lru_cache
 import numpy as np
 
 from ..base.vectors import unit_vector
-from ..motion import quaternion
-from ..motion.foot_plant import (
-    MOST_DROP,
-    Foot,
-    Planted,
-    heel_rise,
-    held_less,
-    held_shift,
-    lacking,
-    laid_foot,
-    lift_to_ground,
-    pelvis_drop,
-    settled,
-    spread_over,
-    turned_flat,
-)
+from ..motion import foot_plant, quaternion
+from ..motion.foot_plant import Foot, Planted, settled
 from ..motion.humanoid import Limb, identify
 from ..motion.limb import CLEAR_BEND, bent_limb
 from ..motion.motion import pose_kinematics
@@ -40,29 +26,21 @@ from .ground_contact import Surface, footing
 MOST_SHIFT = 0.45
 """Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the
 spot turn otherwise on another path."""
-
 FIRST_DROP = 0.015
 """Metres that the pelvis is lowered before a heel is raised where a leg does not reach."""
-
 DROP_BY_SLOPE = 0.15
 """Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
-
 SINK_BY_SLOPE = 0.15
 """Metres by which the pelvis is lower, times the slope: knees bend more on slopes, up and down."""
-
 SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
-
 LONGEST = (0.3, 1.3)
 """How many times as long as it was a step is made at least and at most."""
-
 BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
 """Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
 of a smooth course."""
-
 LEAST_BEND = 0.05
 """Root of the metres that a leg always lacks to its full length."""
-
 _FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
@@ -91,16 +69,8 @@ class Steps:
     times: np.ndarray
 
 
-def follow(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    fps: float,
-    ground: Ground,
-    sole: float,
-    steps: Steps | None = None,
-) -> Planted:
+def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
+           ground: Ground, sole: float, steps: Steps | None = None) -> Planted:
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat
@@ -109,24 +79,24 @@ def follow(
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
-    feet = [_steady(laid_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
+    feet = [_steady(foot_plant.laid_foot(places, world, limb, standing[:, side])) for side, limb in enumerate(limbs)]
     if steps is not None:
         feet = [_stretched(foot, root, steps) for foot in feet]
-    feet = [turned_flat(foot, scale) for foot in feet]
+    feet = [foot_plant.turned_flat(foot, scale) for foot in feet]
     feet, lifted = _on_own_ground(feet, ground.own, sole, scale)
     firm = [foot.weight for foot in feet]
     for turn in range(_ROUNDS + 1):
-        shifts = [held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
+        shifts = [foot_plant.held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
         put = [foot.moved(np.pad(by, ((0, 0), (0, 1)))) for foot, by in zip(feet, shifts)]
         put, up, most = _on_ground(put, standing, fps, ground, lifted)
-        first = pelvis_drop(put, [foot.heel for foot in put], spread, FIRST_DROP)
+        first = foot_plant.pelvis_drop(put, [foot.heel for foot in put], spread, FIRST_DROP)
         put = [replace(foot, hip=foot.hip - first[:, None] * _UP) for foot in put]
         goals = [_goal(foot, spread) for foot in put]
-        drop = pelvis_drop(put, [goal for goal, _ in goals], spread, most - FIRST_DROP)
-        short = [lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
+        drop = foot_plant.pelvis_drop(put, [goal for goal, _ in goals], spread, most - FIRST_DROP)
+        short = [foot_plant.lacking(foot, goal, drop) for foot, (goal, _) in zip(put, goals)]
         if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
             break
-        firm = [held_less(weight, s) for weight, s in zip(firm, short)]
+        firm = [foot_plant.held_less(weight, s) for weight, s in zip(firm, short)]
     down = (first + drop - up)[:, None] * _UP
     places = places - down[:, None]
     out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
@@ -175,18 +145,16 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
     return foot.moved(np.pad((much * ahead)[:, None] * along, ((0, 0), (0, 1))))
 
 
-def _on_own_ground(
-    feet: list[Foot], own: np.ndarray, sole: float, scale: float
-) -> tuple[list[Foot], np.ndarray]:
+def _on_own_ground(feet: list[Foot], own: np.ndarray, sole: float, scale: float) -> tuple[list[Foot], np.ndarray]:
     """Feet on their ground, `own` (T, 2) m high, since the floors of recordings are uneven and drift; metres (T,) by
     which the body is off it: by as much as the feet that stand, and as they were in the air."""
     above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
-    lifts = [lift_to_ground(foot, sole, scale) for foot in above]
+    lifts = [foot_plant.lift_to_ground(foot, sole, scale) for foot in above]
     weights = [foot.carries for foot in feet]
     lifted = sum((w * lift for w, lift in zip(weights, lifts)), np.zeros(()))
     off = settled(lifted, sum(weights, np.zeros(())), scale, _FLOOR)
     if np.abs(off).max(initial=0.0) > _EVEN:
-        lifts = [off + lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
+        lifts = [off + foot_plant.lift_to_ground(foot.moved(off[:, None] * _UP), sole, scale) for foot in above]
     return [foot.moved(by[:, None] * _UP) for foot, by in zip(feet, lifts)], off
 
 
@@ -194,14 +162,13 @@ def _frames(seconds: float, fps: float) -> int:
     return int(round(seconds * fps))
 
 
-def _on_ground(
-    feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground, lifted: np.ndarray
-) -> tuple[list[Foot], np.ndarray, float]:
+def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground,
+               lifted: np.ndarray) -> tuple[list[Foot], np.ndarray, float]:
     """Feet on their ground, metres (T,) by which the body goes up for that, and metres by which it may go down further;
     lifted (T,) m: by which the feet were lifted before."""
     if ground.surface is None:
         up = lifted
-        return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, MOST_DROP
+        return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, foot_plant.MOST_DROP
     over = np.stack([np.stack([foot.heel, foot.toe], axis=1) for foot in feet], axis=1)
     clear = over[..., 2].min(axis=2) - ground.own
     under = footing(over[..., :2], standing, clear, fps, ground.surface)
@@ -211,7 +178,7 @@ def _on_ground(
     up = lifted + _followed(rise.mean(axis=1) - SINK_BY_SLOPE * steeper, fps)
     tip = quaternion.between(ground.up, under.normal)
     put = [_tipped(foot, tip[:, side], rise[:, side] + under.lift[:, side], up) for side, foot in enumerate(feet)]
-    return put, up, MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
+    return put, up, foot_plant.MOST_DROP + DROP_BY_SLOPE * float(steep.max(initial=0.0))
 
 
 def _steepness(height: np.ndarray, normal: np.ndarray, fps: float) -> np.ndarray:
@@ -229,19 +196,14 @@ def _followed(height: np.ndarray, fps: float) -> np.ndarray:
 def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
     """The foot tipped (T, 4) about its toe and brought up by rise (T,) m; its hip goes up by `up` (T,) m."""
     toe = foot.toe + rise[:, None] * _UP
-    return replace(
-        foot,
-        hip=foot.hip + up[:, None] * _UP,
-        toe=toe,
-        heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
-        rotation=quaternion.multiply(tip, foot.rotation),
-        left=quaternion.rotate(tip, foot.left),
-    )
+    return replace(foot, hip=foot.hip + up[:, None] * _UP, toe=toe,
+                   heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
+                   rotation=quaternion.multiply(tip, foot.rotation), left=quaternion.rotate(tip, foot.left))
 
 
 def _goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
     """Where the ankle goes (T, 3) and the foot's world rotation (T, 4): on its toe where the leg does not reach."""
-    rise = spread_over(heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
+    rise = foot_plant.spread_over(foot_plant.heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
     roll = quaternion.about_axis(foot.left, rise)
     return foot.toe + quaternion.rotate(roll, foot.heel - foot.toe), quaternion.multiply(roll, foot.rotation)
 

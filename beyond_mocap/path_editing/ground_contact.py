@@ -1,4 +1,6 @@
-"""The ground under a rider's feet: where each foot stands, how high and how steep it is there, and in between.
+"""The ground under a rider's feet: where each foot stands, how high and how steep it is there, and in between;
+and where a path bends more tightly, or climbs more steeply, than feet can follow: none is planted there, and a line
+says so.
 
 A foot's ground is a plane for as long as it stands, through what lies under its heel and its toe. On its way from one
 stance to the next it goes over from plane to plane, and is lifted where something sticks out in between (a stair's
@@ -11,23 +13,23 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from ..base.easing import quintic_step_by_powers
-from ..base.time_series import interpolate, runs
+from ..base.errors import TimedLine
+from ..base.time_series import hann_smooth, interpolate, runs
+from ..base.vectors import arctan2, cross_level
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain
 
 STEEPEST = 0.7
 """Slope of the ground under a foot beyond which it is an edge that the foot stands on, flat."""
-
 CLEARANCE, MOST_LIFT = 0.02, 0.35
 """Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at
 most."""
-
 ABOVE = 1.0
 """Metres above the path below which the ground is looked for: a bridge overhead is not stood on."""
-
 _EVERY = 0.03  # metres between the places at which a path's height is looked up
 _BEYOND = 1.5  # metres by which its ends are continued
 _ROUNDS = 4
@@ -36,6 +38,15 @@ _LONGEST_SWING = 1.5  # seconds; a foot that is longer in the air follows the gr
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """(places (N, 2) m, frames (N,) int in which a foot is there) -> heights (N,) m and slopes (N, 2), by x and by y."""
+TIGHT = 0.3
+"""Metres of radius, about a foot's length, below which a bend is too tight to walk on."""
+STEEP = 60.0
+"""Degrees from which on a path is no ground."""
+LASTING = 0.5
+"""Metres of path, within a metre, that have to be so: a single corner is only a corner."""
+_JOINED = 0.5  # seconds between two such stretches that are one
+_FADE = 0.12  # seconds, twice of which go by from feet that are planted to feet that are not
+_AS_OWN = 1.5  # times the own path's curvature up to which a bend is the motion's own
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,10 +188,8 @@ def _planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surf
     return np.where(edge, np.maximum(at_toe, at_heel), at_toe), slope
 
 
-def _clearing(
-    feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray, which: np.ndarray,
-    surface: Surface,
-) -> np.ndarray:
+def _clearing(feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray,
+              which: np.ndarray, surface: Surface) -> np.ndarray:
     """(T,) metres by which a foot in the air goes higher so that neither end of it is in the ground: a bump a swing."""
     lift = np.zeros(len(feet))
     aloft = np.flatnonzero((way > 0.0) & (way < 1.0))
@@ -196,3 +205,64 @@ def _clearing(
     np.maximum.at(most, which[aloft], asked)
     lift[aloft] = (np.minimum(most, MOST_LIFT)[which] * bump)[aloft]
     return lift
+
+
+def find_tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) bool: frames within a tight stretch. at (T,): the path's parameters, arc (T,) m passed until then, own (T,)
+    1/m: how much the motion's own path bends there: what it could do it still can."""
+    bend = curvature(path, at)
+    return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc, fps)
+
+
+def find_steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the
+    motion's own path."""
+    slope = arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
+    return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc, fps)
+
+
+def curvature(path: Path, at: np.ndarray) -> np.ndarray:
+    """(T,) 1/m: how much a path bends over the ground at parameters `at` (T,)."""
+    first, second = path.at(at, 1)[:, :2], path.at(at, 2)[:, :2]
+    return np.abs(cross_level(first, second)) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
+
+
+def share_free(free: np.ndarray, fps: float) -> np.ndarray:
+    """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
+    wide = int(round(_FADE * fps))
+    inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
+    return hann_smooth(inner, wide)
+
+
+def strain_lines(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
+    """One line for each kind of stretch, with its seconds; tight and steep (T,) bool."""
+    lines = []
+    for which, what in ((tight, f"the path bends more tightly than {TIGHT:g} m radius"),
+                        (steep, f"the path is steeper than {STEEP:g} degrees")):
+        spans = [(first / fps, (end - 1) / fps) for first, end in runs(which)]
+        if spans:
+            more = f" and {len(spans) - 1} times more" if len(spans) > 1 else ""
+            when = f"from {spans[0][0]:.1f} s to {spans[0][1]:.1f} s{more}"
+            lines.append(TimedLine(f"{what} {when}: feet are not planted there; smooth the path", *spans))
+    return tuple(lines)
+
+
+def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
+    """`bad` (T,) where it goes on for LASTING metres within the metre around it."""
+    if not bad.any():
+        return bad
+    step = np.abs(np.diff(arc, prepend=arc[:1]))
+    way, passed = np.cumsum(step * bad), np.cumsum(step)
+    first = np.clip(passed - 0.5, 0.0, max(passed[-1] - 1.0, 0.0))
+    within = np.interp(first + 1.0, passed, way) - np.interp(first, passed, way)
+    return _joined(within >= LASTING, fps)
+
+
+def _joined(which: np.ndarray, fps: float) -> np.ndarray:
+    """`which` (T,) with gaps of at most _JOINED seconds between two true ones filled."""
+    out, gap = which.copy(), int(_JOINED * fps)
+    spans = runs(which)
+    for (_, end), (first, _) in zip(spans[:-1], spans[1:]):
+        if first - end <= gap:
+            out[end:first] = True
+    return out

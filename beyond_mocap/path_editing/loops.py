@@ -21,7 +21,6 @@ from .path_frame import Residuals
 
 WINDOW_SECONDS = 0.12
 """Pairs are compared over so much before and after."""
-
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
 _ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24
 _STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
@@ -75,9 +74,8 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
     tried = _rough(features, residuals, free, least, stride)
     usual = float(np.sqrt(2.0 * features[moving].var(axis=0).sum()))
     feet = _feet(residuals.skeleton, features)
-    found = [_exact(
-        features, residuals, pair, free=free, least=least, stride=stride, usual=usual, feet=feet,
-    ) for pair in tried]
+    found = [_exact(features, residuals, pair, free=free, least=least, stride=stride, usual=usual,
+                    feet=feet) for pair in tried]
     found = [loop for loop in found if loop and loop.unlike <= _MOST and _strides(residuals.standing, loop)]
     best: dict[int, Loop] = {}
     for loop in sorted(found, key=lambda loop: (loop.cost, loop.start, loop.end)):
@@ -180,9 +178,8 @@ def _strides(standing: np.ndarray, loop: Loop) -> bool:
     return bool(alone >= _EACH_FOOT or not standing.any())
 
 
-def _rough(
-    features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int, stride: float
-) -> list[tuple[int, int]]:
+def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
+           stride: float) -> list[tuple[int, int]]:
     """Up to _TRIED pairs (start, end) of frames, all well apart from one another, that look alike at a low rate."""
     count, fps = len(features), residuals.fps
     every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
@@ -218,10 +215,8 @@ def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
     return kept
 
 
-def _exact(
-    features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int, stride: float,
-    usual: float, feet: np.ndarray | None,
-) -> Loop | None:
+def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int,
+           stride: float, usual: float, feet: np.ndarray | None) -> Loop | None:
     """The best loop around a rough pair, compared over windows at the full rate; usual: metres that any two moments are
     apart; feet (T, 2, 2) m: see `_feet`."""
     count, fps = len(features), residuals.fps
@@ -257,9 +252,8 @@ def _exact(
                 strides=(last - first) / stride, ending=ending / usual)
 
 
-def _soles_apart(
-    residuals: Residuals, feet: np.ndarray | None, start: np.ndarray, end: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _soles_apart(residuals: Residuals, feet: np.ndarray | None, start: np.ndarray,
+                 end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which
     feet that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
     soles = residuals.standing.reshape(len(residuals), 4)

@@ -1,30 +1,34 @@
-"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; and B-splines
-by their control points (Path editing §4.6.6).
-"""
+"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; tables of
+points `x_m,y_m[,z_m]`; and B-splines by their control points (Path editing §4.6.6)."""
 
 from __future__ import annotations
+
+import os
 
 import numpy as np
 
 from ..base.errors import InputError
 from ..base.time_series import interpolate, runs
 from ..base.vectors import distance_along, unit_vectors
+from ..files.tables import number, read_rows
 from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
 from ..motion.path.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
 """Metres over which corners are rounded, some."""
-
 SHORTEST = 0.2
 """Metres that a line has at least."""
-
 _SAMPLE = 1 / 4  # of the rounding, between samples of the line
 _PIECE = 1 / 2  # of the rounding, a piece of the spline
 _LONGEST = 5000  # roundings: longer lines are rounded more
 _HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
 _LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3
 _ORDER = 3  # the change of the bend is what costs, so that a bend that stays is kept to the line's very ends
+
+COLUMNS = ("x_m", "y_m", "z_m")
+_SHORT = {name[0]: name for name in COLUMNS}
+_LEAST_METRES, _MOST_METRES = 1e-6, 1e5  # of a table
 
 
 def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
@@ -42,9 +46,8 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     sampled = _with_hairpins(sampled, along, rounding, closed)
     pieces = max(int(np.ceil(along[-1] / (rounding * _PIECE))), 8)
     if closed:
-        spline = smoothing_spline(
-            sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True, domain=(0.0, along[-1])
-        )
+        spline = smoothing_spline(sampled[:-1], along[:-1], pieces, rounding, _ORDER, closed=True,
+                                  domain=(0.0, along[-1]))
     else:
         weights = np.ones(len(along))
         spline = smoothing_spline(sampled, along, pieces, stiff=rounding, order=_ORDER, weights=weights, ends_met=True)
@@ -99,10 +102,8 @@ def straight(path: Path, count: int) -> np.ndarray:
 def _check_degree(count: int, degree: int) -> None:
     """InputError where a B-spline of `count` control points cannot have this degree."""
     if not 1 <= degree < count:
-        raise InputError(
-            "control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
-            "take more points or a lower degree",
-        )
+        raise InputError("control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
+                         "take more points or a lower degree")
 
 
 def _even_knots(count: int, degree: int) -> np.ndarray:
@@ -209,3 +210,28 @@ def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
     along = distance_along(line)
     even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
     return interpolate(even, along, line), even
+
+
+def read_curve(path: str | os.PathLike) -> np.ndarray:
+    """(N, 3) metres, N >= 2: the points of a CSV file in the order of its rows, in the pitch's frame, z 0 where the
+    column is missing; other columns are ignored. The columns may also be named x, y and z, and be separated by
+    semicolons or tabs; then numbers may have decimal commas.
+
+    InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
+    given, or more than 100 km in all.
+    """
+    names, points = COLUMNS[:2], []
+    for place, row in read_rows(path, names, _SHORT, ",;\t"):
+        if not points:
+            names = COLUMNS if "z_m" in row else names
+        points.append([number(row[name], name, place) for name in names])
+    line = np.zeros((len(points), 3))
+    if points:
+        line[:, : len(names)] = points
+    if not len(line) or np.ptp(line, axis=0).max() < _LEAST_METRES:
+        what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
+        raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] that lie apart", "add points")
+    if (length := np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > _MOST_METRES:
+        most = f"at most {_MOST_METRES / 1000:.0f} km"
+        raise InputError(path, f"a path of {length / 1000:.0f} km", most, "check the unit")
+    return line

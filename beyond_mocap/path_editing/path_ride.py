@@ -31,15 +31,13 @@ def figures(source, ridden, path, ground=None) -> dict:
     pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
     fps = ridden.motion.fps
-    out = {
-        "length_m": float(np.ptp(ridden.arc)) if len(ridden.arc) else 0.0,
-        "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
-        "root_error_own_m": _spread(_own_error(source, own)),
-        "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
-        "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
-        "seam_jerk": _seams(source, ridden, own, pelvis),
-        "ground_mm": None, "skate": None, "knee_jerk_ratio": None, "foot_correction_m": None, "ik_miss_share": None,
-    }  # fmt: skip
+    out = {"length_m": float(np.ptp(ridden.arc)) if len(ridden.arc) else 0.0,
+           "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
+           "root_error_own_m": _spread(_own_error(source, own)),
+           "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
+           "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
+           "seam_jerk": _seams(source, ridden, own, pelvis), "ground_mm": None, "skate": None, "knee_jerk_ratio": None,
+           "foot_correction_m": None, "ik_miss_share": None}
     if not source.humanoid:
         return out
     return {**out, **_feet(source, ridden, frames, ground), "knee_jerk_ratio": knee_jerk(source, ridden, frames)}
@@ -121,20 +119,16 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
     points, own_points = carried(ridden), source.standing
     own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
     used = np.unique(frames)
-    skate = {
-        **_skate("", mine, points, ridden.motion.fps),
-        **_skate("source_", own, own_points, source.motion.fps, used),
-        **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps),
-    }
+    skate = {**_skate("", mine, points, ridden.motion.fps),
+             **_skate("source_", own, own_points, source.motion.fps, used),
+             **_skate("before_", _foot_places(ridden.rigid), points, ridden.motion.fps)}
     way = source.path.at(np.arange(len(own)) / source.motion.fps)
     stood, own_stood = points.all(axis=2), own_points.all(axis=2)
     correction = ridden.correction[points.any(axis=2)]
     return {
         "skate": skate,
-        "ground_mm": {
-            **_ground("", mine, stood, origin=ridden.origin, recording=source.motion, ground=ground),
-            **_ground("source_", own, own_stood, origin=way, recording=source.motion, ground=None),
-        },
+        "ground_mm": {**_ground("", mine, stood, origin=ridden.origin, recording=source.motion, ground=ground),
+                      **_ground("source_", own, own_stood, origin=way, recording=source.motion, ground=None)},
         "foot_correction_m": _spread(correction) if len(correction) else None,
         "ik_miss_share": float(np.mean(ridden.miss.max(axis=1) > MISSED)),
     }
@@ -164,12 +158,9 @@ def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: 
         kept = used[used < len(speeds)]
         speeds, point = speeds[kept], point[kept]
     travel = feet.stance_travel(places[:, :, 1], feet.stances(flat))
-    return {
-        f"{name}contact_cm_s": 100.0 * _mean(speeds),
-        f"{name}point_cm_s": 100.0 * _mean(point),
-        f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
-        f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float)),
-    }
+    return {f"{name}contact_cm_s": 100.0 * _mean(speeds), f"{name}point_cm_s": 100.0 * _mean(point),
+            f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
+            f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float))}
 
 
 def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray, recording: Motion, ground) -> dict:
@@ -186,11 +177,9 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
     heel_rest = max(rest, ankle) + toe_rest - ankle
     lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - heel_rest)
     standing = lower[flat & np.isfinite(lower)]
-    return {
-        f"{name}deepest": 1000.0 * float(np.nanmin(lower)) if np.isfinite(lower).any() else None,
-        f"{name}standing_p95": 1000.0 * float(np.percentile(np.abs(standing), 95)) if len(standing) else None,
-        f"{name}standing_max": 1000.0 * float(np.abs(standing).max()) if len(standing) else None,
-    }
+    return {f"{name}deepest": 1000.0 * float(np.nanmin(lower)) if np.isfinite(lower).any() else None,
+            f"{name}standing_p95": 1000.0 * float(np.percentile(np.abs(standing), 95)) if len(standing) else None,
+            f"{name}standing_max": 1000.0 * float(np.abs(standing).max()) if len(standing) else None}
 
 
 def _surface(places: np.ndarray, origin: np.ndarray, ground) -> np.ndarray:

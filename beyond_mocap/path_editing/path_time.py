@@ -10,6 +10,9 @@ speeds"; walkers downhill: Kawamura et al. 1991). Who wishes it goes slower ther
 1993), and slower in tight bends, by the two-thirds power law (Lacquaniti et al. 1983; of walkers: Vieilledent et al.
 2001); half of that are shorter steps and half a slower tempo, as people keep the ratio of the two when they slow down
 (Sekiya et al. 1996, the walk ratio).
+
+Where a path ends before the motion does, the motion stops there or begins again with the path (§3.2.3); a closed path
+has no end: the motion goes round and round.
 """
 
 from __future__ import annotations
@@ -19,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from ..base.errors import InputError, TimedLine
 from ..base.vectors import cross_level
 from ..motion import quaternion
 from ..motion.path.arc_length import ArcLength
@@ -28,17 +32,21 @@ from .path_frame import Residuals
 
 SHORTER = 0.4
 """By how much steps are shorter on slopes: this times the slope, as a share."""
-
 BEND = 2.0
 """Metres of radius below which bends slow."""
-
 LEAST_STEP, LEAST_SPEED = 0.8, 0.35
 """Shares of a step's length on the level, and of the speed, that are kept at least."""
-
 _GRID = 0.05  # metres
 _SMOOTH = 0.7  # metres of path over which slopes and bends are felt
 _STRIDE_SECONDS, _CREEPS = 0.5, 0.05  # s over which a stride is told, m/s that say nothing about it
 _MOVES = 0.4  # m/s; whoever is slower tells nothing about bends
+
+REACHED = 1e-3
+"""Metres by which a motion may overshoot the path and still be of its length."""
+SHORTEST = 1e-6
+"""Metres that a path is long at least."""
+_STEP = 0.5  # metres; a path or lap shorter than this is told
+_SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: of a lap that is begun anew, and of a motion's end that nobody misses
 
 
 @dataclass(frozen=True)
@@ -87,9 +95,8 @@ def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
-def by_way(
-    residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float, closed: bool
-) -> Timing:
+def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float,
+           closed: bool) -> Timing:
     """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
 
     The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS /
@@ -174,7 +181,7 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
     return both[:, 0] / both[:, 1]
 
 
-def shown(residuals: Residuals, at: np.ndarray) -> Residuals:
+def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
     """The residuals at rows `at` (N,), fractional: cubics through the four rows around (Catmull and Rom 1974), since
     straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns
     are those from one output frame to the next."""
@@ -214,3 +221,55 @@ def _played(count: int, speed: float, delay: float, fps: float) -> np.ndarray:
     last = int(np.floor((count - 1) / speed + 1e-6))
     waits = int(round(delay * fps))
     return np.concatenate([np.zeros(waits), np.arange(last + 1) * speed])
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """count: frames from the beginning to the end of the path; shown (N,): which of these every output frame is; again
+    (S,): output frames at which the motion begins anew; told: lines for the user."""
+
+    count: int
+    take_rows: np.ndarray
+    again: np.ndarray
+    told: tuple[str, ...] = ()
+
+
+def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed: bool = False) -> Ending:
+    """How a motion ends on a path `length` metres long, when it is at arc (T,) m, never falling, in its frames.
+
+    end: "stop", or "repeat": motion and path begin again, as often as there are frames, without the wait that a rider
+    begins with. InputError for a path that has no length.
+    """
+    if not np.isfinite(length) or length <= SHORTEST:
+        raise InputError("path", "it has no length", "two different points", "draw a longer path")
+    total = len(arc)
+    whole = np.arange(total)
+    none = np.zeros(0, dtype=int)
+    short = (f"the path is only {length:.2f} m long, less than a step",) if length < _STEP else ()
+    if closed:
+        return Ending(total, whole, none, short)
+    count = max(int(np.searchsorted(arc, length + REACHED, side="right")), 1)
+    if count == total:
+        return Ending(total, whole, none, short)
+    first = _begins(arc[:count])
+    if end == "repeat" and count - first >= _SHORTEST_LAP * fps:
+        return _again(first, count, total, fps, short)
+    when, left = count / fps, (total - count) / fps
+    line = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
+    stops = (line,) if left > _UNSEEN else ()
+    brief = ("the path is passed too quickly to begin again",) if end == "repeat" else ()
+    return Ending(count, whole[:count], none, (*stops, *brief, *short))
+
+
+def _begins(arc: np.ndarray) -> int:
+    """The last of the frames that wait at the path's beginning."""
+    return max(int(np.searchsorted(arc, arc[0] + 1e-12, side="right")) - 1, 0)
+
+
+def _again(first: int, count: int, total: int, fps: float, told: tuple[str, ...]) -> Ending:
+    later = np.arange(total - count)
+    shown = np.concatenate([np.arange(count), first + later % (count - first)])
+    again = np.arange(count, total, count - first)
+    times = "once" if len(again) == 1 else f"{len(again)} times"
+    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion begins again {times}", (count / fps,) * 2)
+    return Ending(count, shown, again, (line, *told))

@@ -24,30 +24,13 @@ from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain
 from ..motion.track import zero_phase_hann
 from ..synthesis.construct.banking import banked, bent_forward, missing_lean
+from . import ground_contact, path_frame, path_time
 from .cycle import cycled
 from .detour import with_detours
 from .foot_ride import LONGEST, Ground, Steps, follow
-from .ground_contact import footing, is_level, mesh_surface, path_surface
 from .loops import Loop, find_loops
-from .path_curvature import curvature, share, steep, tight
-from .path_curvature import told as tight_told
-from .path_end import Ending, ending
-from .path_fit import KINDS, fit, fit_polynomial, fit_spline
-from .path_frame import MovingFrame, Residuals, check_frame, moving_frame, placed, relative
-from .path_time import (
-    Timing,
-    Way,
-    Wishes,
-    asked_length,
-    by_arc_length,
-    by_time,
-    by_way,
-    parameter_at,
-    shown,
-    stretched,
-    way_at,
-    way_of,
-)
+from .path_frame import MovingFrame, Residuals
+from .path_time import Ending, Timing, Way
 
 _DEFAULTS = defaults("path_editing")
 ENDS = setting("path_editing", "end").choice_names
@@ -55,14 +38,11 @@ _SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
 """m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
 smooth as these."""
-
 INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
 """Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some
 3 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is felt."""
-
 OUT_OF_REACH = 0.03
 """Metres that a foot may be short of its place without being told."""
-
 STILL = 0.05
 """Metres of path below which a motion stands still."""
 
@@ -88,11 +68,11 @@ class RideSettings:
     detours: tuple[tuple[float, float, float], ...] = ()
 
     def __post_init__(self):
-        check_frame(self.frame)
+        path_frame.check_frame(self.frame)
         if self.end not in ENDS:
             raise InputError("end of path", str(self.end), " or ".join(ENDS))
-        if self.fit not in KINDS:
-            raise InputError("path fit", str(self.fit), " or ".join(KINDS))
+        if self.fit not in path_frame.KINDS:
+            raise InputError("path fit", str(self.fit), " or ".join(path_frame.KINDS))
         if not _SPEED.least <= self.speed <= _SPEED.most:
             raise InputError("speed", f"{self.speed:g} times", f"{_SPEED.least:g} to {_SPEED.most:g}")
         if not 0.0 <= self.delay < 86400.0:
@@ -129,12 +109,12 @@ class RideSource:
     @cached_property
     def way(self) -> Way:
         """The slopes and bends of its own path."""
-        return way_of(self.path, self.arc)
+        return path_time.way_of(self.path, self.arc)
 
     @cached_property
     def bends(self) -> np.ndarray:
         """(T,) 1/m: how much its own path bends over the ground."""
-        return curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
+        return ground_contact.curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -179,9 +159,8 @@ class Ridden:
         return replace(self, **{name: getattr(self, name)[which] for name in rows}, motion=motion, laid=laid)
 
 
-def prepare(
-    motion: Motion, settings: RideSettings, standing: np.ndarray | None = None, path: Path | None = None
-) -> RideSource:
+def prepare(motion: Motion, settings: RideSettings, standing: np.ndarray | None = None,
+            path: Path | None = None) -> RideSource:
     """The motion relative to its own path.
 
     standing: (T, 2, 2) bool, by default told from the motion (`contacts.points`). path: its own path, its parameter
@@ -197,18 +176,16 @@ def prepare(
     arc = ArcLength(path)
     metres = arc.at(times)
     still = bool(metres[-1] - metres[0] < STILL)
-    moving = moving_frame(path.at(times), path.at(times, 1), metres, motion.fps, _faces(motion, humanoid))
-    place, turned = relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
+    moving = path_frame.moving_frame(path.at(times), path.at(times, 1), metres, motion.fps, _faces(motion, humanoid))
+    place, turned = path_frame.relative(settings.frame, moving, motion.root_positions, motion.rotations[:, 0])
     rotations = motion.rotations.copy()
     rotations[:, 0] = turned
-    under, up = _own_ground(
-        motion, standing, path, arc=arc, moving=moving, metres=metres,
-    ) if humanoid else _flat(len(motion))
-    residuals = Residuals(
-        place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]), standing=np.asarray(standing, bool),
-        frames=np.arange(len(motion), dtype=float), turn=np.diff(moving.heading, prepend=moving.heading[:1]),
-        under=under, up=up, fps=motion.fps, skeleton=motion.skeleton,
-    )  # fmt: skip
+    under, up = _own_ground(motion, standing, path, arc=arc, moving=moving,
+                            metres=metres) if humanoid else _flat(len(motion))
+    residuals = Residuals(place=place, rotations=rotations, step=np.diff(metres, prepend=metres[:1]),
+                          standing=np.asarray(standing, bool), frames=np.arange(len(motion), dtype=float),
+                          turn=np.diff(moving.heading, prepend=moving.heading[:1]), under=under, up=up, fps=motion.fps,
+                          skeleton=motion.skeleton)
     sole = contacts.recorded_floor(motion)[1] if humanoid else 0.0
     return RideSource(motion=motion, standing=residuals.standing, path=path, arc=arc, moving=moving,
                       residuals=residuals, frame=settings.frame, humanoid=humanoid, still=still, sole=sole,
@@ -226,12 +203,12 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     path = with_detours(path, settings.detours)
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)
-    rows = shown(residuals, timing.at)
+    rows = path_time.take_rows(residuals, timing.at)
     at = _parameters(source, path, arc, timing=timing, rows=rows, settings=settings)
     origin, tangent = path.at(at), path.at(at, 1)
     own = _faces(source.motion, source.humanoid) if source.still and path is source.path else None
-    moving = moving_frame(origin, tangent, timing.arc, residuals.fps, own)
-    root, rotations = placed(source.frame, moving, rows.place, rows.rotations)
+    moving = path_frame.moving_frame(origin, tangent, timing.arc, residuals.fps, own)
+    root, rotations = path_frame.placed(source.frame, moving, rows.place, rows.rotations)
     laid = root, rotations
     if settings.lean and source.humanoid:
         rotations = _leaned(source, rows, moving, timing=timing, rotations=rotations, seams=seams)
@@ -255,19 +232,20 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     return _begun_again(ridden, end) if len(end.again) else ridden
 
 
-def _timed(
-    source: RideSource, path: Path, arc: ArcLength, settings: RideSettings
-) -> tuple[Residuals, np.ndarray, Timing, Ending]:
+def _timed(source: RideSource, path: Path, arc: ArcLength,
+           settings: RideSettings) -> tuple[Residuals, np.ndarray, Timing, Ending]:
     """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and
     what happens at the path's end."""
     residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
-    wishes = Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
+    wishes = path_time.Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
     plain = wishes.none or source.still or path is source.path or not settings.by_arc_length
-    way = None if plain else way_of(path, arc)
+    way = None if plain else path_time.way_of(path, arc)
     if way is not None and way.plain(wishes) and source.way.plain(wishes):
         way = None
     if settings.cycle and settings.by_arc_length:
-        asked = arc.length if way is None else asked_length(residuals, _own_way(source, residuals), way, wishes)
+        asked = arc.length
+        if way is not None:
+            asked = path_time.asked_length(residuals, _own_way(source, residuals), way, wishes)
         around = cycled(residuals, asked, source.loops)
         residuals, seams, told = around.residuals, around.seams, around.told
     elif settings.cycle:
@@ -276,15 +254,15 @@ def _timed(
         told += ("the motion stands still: it is placed at the path's beginning",)
     if way is not None:
         own = _own_way(source, residuals)
-        timing = by_way(residuals, own, way, wishes=wishes, speed=settings.speed, delay=settings.delay,
+        timing = path_time.by_way(residuals, own, way, wishes=wishes, speed=settings.speed, delay=settings.delay,
                         closed=path.closed)
     elif settings.by_arc_length or source.still:
-        timing = by_arc_length(residuals, settings.speed, settings.delay)
+        timing = path_time.by_arc_length(residuals, settings.speed, settings.delay)
     else:
-        timing = by_time(residuals, path, arc, settings.speed, settings.delay)
+        timing = path_time.by_time(residuals, path, arc, settings.speed, settings.delay)
     # a cycle ends with the path: what is a hair longer does not begin anew
     wish = "stop" if len(seams) else settings.end
-    end = ending(timing.arc, arc.length, residuals.fps, wish, path.closed or source.still)
+    end = path_time.find_ending(timing.arc, arc.length, residuals.fps, wish, path.closed or source.still)
     timing = timing.first(end.count)
     seams = np.searchsorted(timing.at, seams - 1e-9)
     return residuals, seams[seams < end.count], timing, replace(end, told=(*told, *end.told))
@@ -300,7 +278,7 @@ def _begun_again(ridden: Ridden, end: Ending) -> Ridden:
 
 def _own_way(source: RideSource, residuals: Residuals) -> Way:
     """What the motion's own path is like at every row."""
-    return way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
+    return path_time.way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
 
 
 def _own_slope(source: RideSource, rows: Residuals) -> np.ndarray:
@@ -308,20 +286,18 @@ def _own_slope(source: RideSource, rows: Residuals) -> np.ndarray:
     return np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
 
 
-def _parameters(
-    source: RideSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals, settings: RideSettings
-) -> np.ndarray:
+def _parameters(source: RideSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals,
+                settings: RideSettings) -> np.ndarray:
     """(N,) parameters of the path; the motion's own path keeps its time, so that nothing is lost there."""
     if path is source.path:
         return rows.frames / rows.fps
     if not settings.by_arc_length:
-        return parameter_at(path, timing.at / max(len(source.residuals) - 1, 1))
+        return path_time.parameter_at(path, timing.at / max(len(source.residuals) - 1, 1))
     return arc.parameter(timing.arc % arc.length if path.closed and arc.length > 0.0 else timing.arc)
 
 
-def _leaned(
-    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, rotations: np.ndarray, seams: np.ndarray
-) -> np.ndarray:
+def _leaned(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, rotations: np.ndarray,
+            seams: np.ndarray) -> np.ndarray:
     """The body leant into bends, and its trunk into slopes, as far as the motion did not do so on its own path."""
     fps = rows.fps
     since = np.diff(timing.arc, prepend=timing.arc[:1])
@@ -338,33 +314,31 @@ def _leaned(
     return rotations
 
 
-def _strained(
-    source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarray, timing: Timing, rows: Residuals
-) -> tuple[np.ndarray, tuple[str, ...]]:
+def _strained(source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarray, timing: Timing,
+              rows: Residuals) -> tuple[np.ndarray, tuple[str, ...]]:
     """Frames (N,) bool in which no foot could follow the path, and what is told of them."""
     if path is source.path or source.still:
         return np.zeros(len(rows), dtype=bool), ()
     own = np.interp(rows.frames, np.arange(len(source.bends)), source.bends)
-    bent = tight(path, at, timing.arc, own, rows.fps)
-    risen = steep(tangent, timing.arc, _own_slope(source, rows), rows.fps)
-    return bent | risen, tight_told(bent, risen, rows.fps)
+    bent = ground_contact.find_tight(path, at, timing.arc, own, rows.fps)
+    risen = ground_contact.find_steep(tangent, timing.arc, _own_slope(source, rows), rows.fps)
+    return bent | risen, ground_contact.strain_lines(bent, risen, rows.fps)
 
 
 def _let_go(held: Planted, root: np.ndarray, rotations: np.ndarray, free: np.ndarray, fps: float) -> Planted:
     """The planted motion, but where it is `free` (N,) bool as it was laid out: root (N, 3) m, rotations (N, J, 4)."""
-    much = share(free, fps)[:, None]
+    much = ground_contact.share_free(free, fps)[:, None]
     turned = quaternion.slerp(held.rotations, rotations, much)
     miss = np.where(free[:, None], 0.0, held.miss)
     return Planted(held.root + much * (root - held.root), turned, (1.0 - much) * held.correction, miss)
 
 
-def _steps(
-    source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, free: np.ndarray
-) -> tuple[Steps | None, tuple[str, ...]]:
+def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing,
+           free: np.ndarray) -> tuple[Steps | None, tuple[str, ...]]:
     """How long steps are on the new path, against their own, and what of that legs cannot do; free (N,) bool: where no
     feet are planted."""
     own = rows.step * np.cos(_own_slope(source, rows))
-    times = stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
+    times = path_time.stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
     if times is None:
         return None, ()
     worst = (np.maximum(times / LONGEST[1], LONGEST[0] / np.maximum(times, 1e-3)) > 1.05) & ~free
@@ -388,17 +362,16 @@ def _out_of_reach(miss: np.ndarray, fps: float) -> list[str]:
     return [TimedLine(f"{much}: {times}", *spans)]
 
 
-def _ground(
-    path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain | None, moving: MovingFrame, timing: Timing,
-    rows: Residuals,
-) -> Ground:
+def _ground(path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain | None, moving: MovingFrame,
+            timing: Timing, rows: Residuals) -> Ground:
     """What the feet are to go on."""
     own = moving.origin[:, 2:] + rows.under
     up = quaternion.rotate(quaternion.about_up(moving.heading)[:, None], rows.up)
-    if not settings.slopes or (terrain is None and is_level(path, arc) and not rows.under.any()):
+    if not settings.slopes or (terrain is None and ground_contact.is_level(path, arc) and not rows.under.any()):
         return Ground(own, up)
-    surface = path_surface(path, arc, timing.arc) if terrain is None else mesh_surface(terrain, moving.origin)
-    return Ground(own, up, surface)
+    if terrain is None:
+        return Ground(own, up, ground_contact.path_surface(path, arc, timing.arc))
+    return Ground(own, up, ground_contact.mesh_surface(terrain, moving.origin))
 
 
 def _beside(ground: Terrain | None, origin: np.ndarray) -> tuple[str, ...]:
@@ -409,18 +382,18 @@ def _beside(ground: Terrain | None, origin: np.ndarray) -> tuple[str, ...]:
     return ("the ground lies nowhere under the path: the path's own height counts",)
 
 
-def _own_ground(
-    motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame, metres: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _own_ground(motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame,
+                metres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Metres (T, 2) from the motion's own path up to the ground under its feet, and its normals (T, 2, 3) in the
     frame."""
-    if is_level(path, arc):
+    if ground_contact.is_level(path, arc):
         return _flat(len(motion))
     body = identify(motion.skeleton)
     joints = [[limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
     feet = forward_kinematics(motion)[0][:, joints]
     clear = np.zeros((len(motion), 2))
-    found = footing(feet[..., :2], standing, clear, motion.fps, path_surface(path, arc, metres))
+    surface = ground_contact.path_surface(path, arc, metres)
+    found = ground_contact.footing(feet[..., :2], standing, clear, motion.fps, surface)
     back = quaternion.about_up(-moving.heading)[:, None]
     return found.height - moving.origin[:, 2:], quaternion.rotate(back, found.normal)
 
@@ -446,7 +419,7 @@ def _faces(motion: Motion, humanoid: bool) -> float:
 
 
 def _fitted(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Path:
-    return fit(motion, standing, settings.fit, settings.degree)
+    return path_frame.fit_path(motion, standing, settings.fit, settings.degree)
 
 
 def _fitted_any(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Path:
@@ -455,4 +428,6 @@ def _fitted_any(motion: Motion, standing: np.ndarray, settings: RideSettings) ->
     line = motion.root_positions.copy()
     line[:, 2] = contacts.at_zero(float(np.percentile(places[..., 2].min(axis=1), 2)))
     times = np.arange(len(line)) / motion.fps
-    return fit_spline(line, times) if settings.fit == "spline" else fit_polynomial(line, times, settings.degree)
+    if settings.fit == "spline":
+        return path_frame.fit_spline(line, times)
+    return path_frame.fit_polynomial(line, times, settings.degree)

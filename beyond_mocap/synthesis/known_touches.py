@@ -50,7 +50,7 @@ def solve_touches(plan: Plan, known: SolvedCourse | None = None) -> Plan:
 
 def course_of_track(plan: Plan) -> SolvedCourse | None:
     """The course of the ball of one player's track, solved from its samples alone; None where these are too few."""
-    from ..ball.solve_ball import solve_ball
+    from ..ball.tracked.solve import solve_ball
 
     try:
         solved = solve_ball(plan.track)

@@ -14,8 +14,7 @@ from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
-from ..ball.flight import Launch, fly
-from ..ball.impact import crossing
+from ..ball.flight import Launch, find_crossing, fly
 from ..ball.physics import BASEBALL, Ball
 from ..base.errors import Cancelled, InputError
 from ..evaluation.paired_tests import kept
@@ -273,4 +272,4 @@ def let_go(
 def find_impact(place: np.ndarray, velocity: np.ndarray, target: np.ndarray, ball: Ball = BASEBALL) -> np.ndarray:
     """(3,) m: where a ball without spin, let go at `place` (3,) m with velocity (3,) m/s, first crosses the upright
     plane through the target square to the level line to it, or meets the ground before; NaN where it does neither."""
-    return crossing(fly(Launch(0.0, place, velocity), ball, _LONGEST), target)
+    return find_crossing(fly(Launch(0.0, place, velocity), ball, _LONGEST), target)

@@ -18,8 +18,8 @@ import numpy as np
 
 from ..annotation import KeyMoment, Span, Timeline, format_timeline
 from ..annotation.striking import FOOT_RADIUS
+from ..ball.flight import meet_wall
 from ..ball.physics import BASEBALL, FOOTBALL, Ball
-from ..ball.wall import meets_wall
 from ..base.errors import Cancelled, InputError
 from ..base.time_series import interpolate
 from ..base.vectors import arctan2
@@ -70,7 +70,7 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
     """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
     target, speed = _throw_order(thrower.fastest, chance)
     made = make_throw(thrower, target, speed, chance, fps)
-    impact, _ = meets_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
+    impact, _ = meet_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
     words, limb = f"throwb high {made.arm}", f"{made.arm}_hand"
     return Planted(motion=made.motion, limb=limb, release=made.release, position=made.position, velocity=made.velocity,
                    impact=impact, words=words)
@@ -235,7 +235,7 @@ class _Aim:
             rate = speed / float(np.linalg.norm(velocity))
             turn = float(np.arctan2(target[1], target[0]) - np.arctan2(velocity[1], velocity[0])) + side
             spun = quaternion.rotate(quaternion.about_up(np.array(turn)), np.stack([rate * velocity, rate * spin]))
-            met, _ = meets_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
+            met, _ = meet_wall(start, spun[0], self.ball, target[:2], target[:2], spin=spun[1])
             near = near or bool(np.linalg.norm(met - target) < _HIT)
             if exact and np.linalg.norm(met - target) < _HIT:
                 break

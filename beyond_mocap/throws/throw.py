@@ -14,10 +14,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..ball.arcs import arcs, out_of_reach
-from ..ball.flight import Launch, fly
-from ..ball.impact import crossing
+from ..ball.flight import Launch, find_crossing, fly
 from ..ball.physics import FASTEST, Ball
+from ..ball.shot import arcs, is_out_of_reach
 from ..base.errors import Cancelled, InputError
 from ..base.vectors import arctan2
 from ..motion import quaternion
@@ -228,7 +227,7 @@ class _Work:
         model = f"the model's fastest example has {own:.0f}"
         for most, what in ((self.fastest, self._human), (_BEYOND_EXAMPLES * own, model)):
             slowest = _slowest_without_air(start, end, self.ball.gravity)
-            if slowest > most or slowest > _NEAR * most and out_of_reach(start, end, self.ball, most, spin):
+            if slowest > most or slowest > _NEAR * most and is_out_of_reach(start, end, self.ball, most, spin):
                 raise self._too_far(f"more than {most:.0f} m/s", most, what)
 
     def _too_far(self, takes: str, most: float, what: str) -> InputError:
@@ -342,7 +341,7 @@ class _Work:
         start = 0.0 if self.order.release_time is None else self.order.release_time - left
         launch = Launch(start + left, found.position, found.velocity, found.spin)
         flight = fly(launch, self.ball, found.seconds + _GOES_ON + found.motion.duration)
-        impact = crossing(flight, self.target)
+        impact = find_crossing(flight, self.target)
         self._tell(found, impact, beyond)
         return Thrown(
             motion=found.motion, start_time=start, release=left, limb=EFFECTORS[self.limb], ball=self.ball,

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..ball.flight import meet_wall
 from ..ball.physics import BASEBALL, FOOTBALL
-from ..ball.wall import meets_wall
 from ..base.errors import BeyondMocapError, Cancelled, InputError
 from ..files.bvh import bvh
 from ..library.scan import TABLE_NAME as ANNOTATIONS_NAME
@@ -285,4 +285,4 @@ def _launched(motion: Motion, release: float, limb: int, known: KnownThrow) -> t
 def _wall(position: np.ndarray, launch: np.ndarray, action: Action) -> np.ndarray:
     """Where the ball meets an upright wall at the usual distance, or the ground before it."""
     ahead = launch[:2] / max(float(np.hypot(*launch[:2])), 1e-9)
-    return meets_wall(position, launch, action.ball, position[:2] + action.wall * ahead, ahead)[0]
+    return meet_wall(position, launch, action.ball, position[:2] + action.wall * ahead, ahead)[0]

@@ -61,7 +61,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 
 def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
     """Read what has to be read, and solve; never touches bpy's data."""
-    from ...beyond_mocap.ball.solve_ball import solve_ball
+    from ...beyond_mocap.ball.tracked.solve import solve_ball
 
     if order.tracks:
         source = together(order.tracks)

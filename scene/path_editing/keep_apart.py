@@ -45,7 +45,7 @@ class Trial:
 
     def follower(self, change, may_change: bool = True):
         """The rider with a `Change` as a body of the core; its feet do not matter here."""
-        from ...beyond_mocap.path_editing.follower import Follower
+        from ...beyond_mocap.path_editing.detour import Follower
         from ...beyond_mocap.path_editing.ride import ride
 
         settings = replace(self.settings, delay=self.settings.delay + change.delay, detours=change.detours, plant=False)
@@ -76,7 +76,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
     cannot ride.
     """
     from ...beyond_mocap.path_editing.apart import resolved
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     scene = context.scene
     context.view_layer.update()
@@ -104,7 +104,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
     """Ask riders for these changes and bring them up to date. InputError, and all as before, if one cannot follow."""
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     rides = [body.beyond_mocap_ride for body in bodies]
     before = [(ride.delay, ride.added, ride.detours, ride.agreed) for ride in rides]
@@ -148,7 +148,7 @@ def _own_delay(ride) -> float:
 
 def _others(scene, bodies) -> list:
     """Other riders as they are; those that cannot ride just now, which is told at them, stand in nobody's way."""
-    from ...beyond_mocap.path_editing.follower import Change
+    from ...beyond_mocap.path_editing.detour import Change
 
     found = []
     for body in all_riders(scene):
@@ -234,7 +234,7 @@ def _hangs_on_rider(body) -> bool:
 
 def _follower(scene, body, until: float):
     """Where its hips are over the ground. InputError past the time `until`."""
-    from ...beyond_mocap.path_editing.follower import Follower
+    from ...beyond_mocap.path_editing.detour import Follower
 
     if perf_counter() > until:
         raise _late()

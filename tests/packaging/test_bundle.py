@@ -7,11 +7,11 @@ import io
 import tomllib
 import zipfile
 
+import build
 import bundle
 import lint
 import pytest
-import slim
-import stage
+from wheels import slim
 
 LINUX = bundle.platforms()["linux-x64"]
 PACKAGES = [bundle.Package("scipy", "1.17.1", "2001 SciPy Developers", "BSD-3-Clause"),
@@ -26,7 +26,7 @@ def staged(folder, wheels=WHEELS, platform="linux-x64", packages=PACKAGES, prese
     (folder / "wheels").mkdir()
     for name in present if present is not None else wheels:
         (folder / "wheels" / name).touch()
-    text = stage.complete_manifest(MANIFEST, packages, platform, wheels)
+    text = build.complete_manifest(MANIFEST, packages, platform, wheels)
     (folder / "blender_manifest.toml").write_text(text, "utf-8")
     return folder
 
@@ -44,7 +44,7 @@ def test_whom_a_wheel_serves(name, platform, python, serves):
 
 
 def test_the_completed_manifest_is_toml_and_names_everything():
-    manifest = tomllib.loads(stage.complete_manifest(MANIFEST, PACKAGES, "linux-x64", WHEELS))
+    manifest = tomllib.loads(build.complete_manifest(MANIFEST, PACKAGES, "linux-x64", WHEELS))
     assert manifest["copyright"][0] == "2026 Us"
     assert manifest["copyright"][1] == "2001 SciPy Developers (scipy 1.17.1, BSD-3-Clause)"
     assert manifest["wheels"] == [f"./wheels/{name}" for name in WHEELS]
@@ -92,7 +92,7 @@ def test_slimming_keeps_licence_and_metadata_and_rebuilds_the_record(tmp_path):
         archive.writestr("kloppy-3.19.1.dist-info/licenses/LICENSE", "BSD")
         archive.writestr("kloppy-3.19.1.dist-info/RECORD", "stale,,\n")
     (tmp_path / "out").mkdir()
-    target = slim.slim(source, tmp_path / "out", package)
+    target = slim(source, tmp_path / "out", package)
     assert target.name == "kloppy-3.19.1+slim-py3-none-any.whl"
     with zipfile.ZipFile(target) as archive:
         files = {name: archive.read(name) for name in archive.namelist()}

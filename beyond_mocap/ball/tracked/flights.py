@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...base.time_series import interpolate
@@ -26,9 +28,8 @@ _HIGH = 0.6  # m, where a foot hardly takes a ball
 _AIR = 0.35  # m of the centre above the ground, from which it flies
 
 
-def flown(
-    samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool, cancelled=None
-) -> list[BallPiece]:
+def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, heights: bool,
+          cancelled=None) -> list[BallPiece]:
     """The pieces (in order, without gaps in a window), those between neighbouring `moments` (K,) s of touches replaced
     by flights where these fit. heights: whether those of the samples are meant."""
     groups = _between(pieces, moments)
@@ -215,8 +216,7 @@ def _brought(piece: BallPiece, stretches: Stretches, number: int, ends: tuple[np
     places[:, 2] = np.maximum(places[:, 2] + every[:, 1] * higher, FOOTBALL.radius)
     path = interpolate(since, piece.times - piece.start, places[:, :2])
     residual = _rms(np.linalg.norm(path - stretches.points[number][measured, :2], axis=1)) if len(measured) else np.nan
-    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
-                     residual=residual, bounces=piece.bounces)
+    return replace(piece, positions=places, velocities=speeds, residual=residual)
 
 
 def _dropped(pieces: list[BallPiece]) -> list[BallPiece]:
@@ -236,8 +236,7 @@ def _falling(piece: BallPiece, height: float) -> BallPiece:
     higher = falls > piece.positions[:, 2]
     places, speeds = piece.positions.copy(), piece.velocities.copy()
     places[higher, 2], speeds[higher, 2] = falls[higher], -FOOTBALL.gravity * since[higher]
-    return BallPiece(times=piece.times, positions=places, velocities=speeds, kind=piece.kind, spin=piece.spin,
-                     residual=piece.residual, bounces=piece.bounces)
+    return replace(piece, positions=places, velocities=speeds)
 
 
 def _waves(share: np.ndarray, seconds: float) -> tuple[np.ndarray, np.ndarray]:

@@ -64,10 +64,8 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     times, ball = times[keep], ball[keep]
     known = np.isfinite(ball[:, :2]).all(axis=1)
     if np.count_nonzero(known) < 5:
-        raise InputError(
-            where, f"{np.count_nonzero(known)} samples of the ball", "at least five",
-            "choose a feed with a ball, times that rise, or more seconds of it",
-        )
+        raise InputError(where, f"{np.count_nonzero(known)} samples of the ball", "at least five",
+                         "choose a feed with a ball, times that rise, or more seconds of it")
     interval = float(np.median(np.diff(times)))
     filled = _filled(ball[:, :2], known, interval)
     scatter = _scatter(ball[:, :2], interval)

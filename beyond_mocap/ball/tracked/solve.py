@@ -15,11 +15,11 @@ import numpy as np
 from ...base.errors import Cancelled, InputError
 from ...base.time_series import interpolate
 from ...motion.skeleton import frozen_array
-from ...motion.track import BALL_RADIUS
-from . import cuts as cutting
-from . import kinds, touches, who
-from .ends import BallEnd, ball_ends
+from ...motion.track import BALL_RADIUS, Track
+from ...motion.track.match_data import REFEREE, Match
+from . import kinds, pieces, touches
 from .flights import flown
+from .kinds import BallEnd, ball_ends
 from .path import BallPiece, SolvedPath
 from .samples import Samples, read_samples
 
@@ -86,17 +86,9 @@ class SolvedBall:
         """The pieces of the path."""
         return self.ball.pieces
 
-def solve(
-    times: np.ndarray,
-    ball: np.ndarray,
-    positions: np.ndarray,
-    players: Sequence[str],
-    teams: Sequence[str] = (),
-    pitch: tuple[float, float] = PITCH,
-    where: str = "ball",
-    progress: Callable[[float, str], None] | None = None,
-    cancelled: Callable[[], bool] | None = None,
-) -> SolvedBall:
+def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: Sequence[str], teams: Sequence[str] = (),
+          pitch: tuple[float, float] = PITCH, where: str = "ball", progress: Callable[[float, str], None] | None = None,
+          cancelled: Callable[[], bool] | None = None) -> SolvedBall:
     """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
 
     teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
@@ -105,7 +97,7 @@ def solve(
     samples = read_samples(times, ball, where)
     every, first = np.unique(np.asarray(times, float), return_index=True)
     positions = np.asarray(positions, float)[:, first[np.searchsorted(every, samples.times)]]
-    stranger = who.STRANGER if len(players) > 1 else who.ALONE
+    stranger = touches.STRANGER if len(players) > 1 else touches.ALONE
     windows = _windows(samples, where)
     found = []
     for number, window in enumerate(windows):
@@ -126,11 +118,10 @@ def solve(
     solved = _thrown_in(solved, ends, pitch[1])
     residuals = np.where(samples.known, path.residuals(samples.times, samples.positions), np.nan)
     sure = float(np.mean([touch.confidence for touch in solved])) if solved else 0.0
-    return SolvedBall(
-        times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled, outlier=samples.outlier,
-        measured=frozen_array(samples.measured, bool), residuals=frozen_array(residuals),
-        ends=tuple(_by_whom(end, solved) for end in ends), confidence=sure, notes=_notes(samples, heights),
-    )  # fmt: skip
+    return SolvedBall(times=samples.times, touches=tuple(solved), ball=path, filled=samples.filled,
+                      outlier=samples.outlier, measured=frozen_array(samples.measured, bool),
+                      residuals=frozen_array(residuals), ends=tuple(_by_whom(end, solved) for end in ends),
+                      confidence=sure, notes=_notes(samples, heights))
 
 
 def _windows(samples: Samples, where: str) -> list[slice]:
@@ -160,8 +151,8 @@ def _bridged(samples: Samples, window: slice) -> np.ndarray:
 def _solve_window(samples: Samples, window: slice, positions: np.ndarray, stranger: float) -> touches.Cuts:
     times, points = samples.times[window], _bridged(samples, window)
     weights = samples.used[window] / samples.scatter[window] ** 2 * min(1.0, samples.interval / _TOGETHER)
-    places = cutting.promising(times, points, samples.used[window], samples.interval)
-    chosen = cutting.choose_cuts(times, points, weights, places)
+    places = pieces.find_promising(times, points, samples.used[window], samples.interval)
+    chosen = pieces.choose_cuts(times, points, weights, places)
     cost = _reach_cost(times, points, positions[:, window], chosen, stranger)
     return touches.solve_cuts(times, points, weights, chosen, cost)
 
@@ -171,8 +162,8 @@ def _reach_cost(times, points, positions, cuts, stranger) -> np.ndarray:
     costs = []
     for near in (cuts - 1, cuts):
         index = np.clip(near, 0, len(times) - 1)
-        away = who.distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
-        costs.append(who.reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, stranger))
+        away = touches.player_distances(times, points[index, :2], positions, times[index]).min(axis=0, initial=np.inf)
+        costs.append(touches.reach_cost(away, points[index, 2] if points.shape[1] == 3 else None, stranger))
     return np.minimum(*costs)
 
 
@@ -212,14 +203,13 @@ def _lifted(places: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndar
 def _piece(samples: Samples, at: np.ndarray, places: np.ndarray, speeds: np.ndarray) -> BallPiece:
     part = slice(*np.searchsorted(samples.times, [at[0], at[-1]]))
     seen = samples.measured[part]
-    piece = SolvedPath((BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3),
-                                  residual=np.nan, bounces=np.zeros(0)),))
-    off = piece.residuals(samples.times[part], samples.positions[part])[seen]
+    piece = BallPiece(times=at, positions=places, velocities=speeds, kind="", spin=np.zeros(3), residual=np.nan,
+                      bounces=np.zeros(0))
+    off = SolvedPath((piece,)).residuals(samples.times[part], samples.positions[part])[seen]
     fast, high = np.linalg.norm(speeds[:, :2], axis=1).max(), places[:, 2].max()
     kind = "flight" if high > 0.5 else "still" if fast < 0.3 else "roll"
     residual = float(np.sqrt(np.mean(off**2))) if len(off) else np.nan
-    return BallPiece(times=at, positions=places, velocities=speeds, kind=kind, spin=np.zeros(3), residual=residual,
-                     bounces=np.zeros(0))
+    return replace(piece, kind=kind, residual=residual)
 
 
 def _named(samples, found, positions, players, teams, pitch, stranger) -> list[SolvedTouch]:
@@ -231,8 +221,8 @@ def _named(samples, found, positions, players, teams, pitch, stranger) -> list[S
     time, spread, margin, place, before, after = (column[order] for column in columns)
     if not len(time):
         return []
-    away = who.distances(samples.times, place[:, :2], positions, time)
-    chosen = who.choose(away, time, _between(samples, positions, time), stranger)
+    away = touches.player_distances(samples.times, place[:, :2], positions, time)
+    chosen = touches.choose_players(away, time, _between(samples, positions, time), stranger)
     everybody = np.isfinite(away).sum(axis=0) >= _EVERYBODY
     kept = np.flatnonzero((chosen >= 0) | ~everybody)
     time, spread, margin, place = time[kept], spread[kept], margin[kept], place[kept]
@@ -340,10 +330,35 @@ def _sure(margin: float, away: np.ndarray, player: int) -> float:
     touch = 1.0 / (1.0 + np.exp(-margin / _DOUBT))
     if player < 0:
         return float(0.5 * touch)
-    worth = np.exp(-who.reach_cost(away, None) - away / who.STRAY)
+    worth = np.exp(-touches.reach_cost(away, None) - away / touches.STRAY)
     return float(touch * worth[player] / max(worth.sum(), 1e-12))
 
 
 def _by_whom(end: BallEnd, solved: list[SolvedTouch]) -> BallEnd:
     earlier = [touch.player for touch in solved if touch.time < end.time]
-    return BallEnd(time=end.time, kind=end.kind, x=end.x, y=end.y, player=earlier[-1] if earlier else "")
+    return replace(end, player=earlier[-1] if earlier else "")
+
+
+def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | None = None,
+               cancelled: Callable[[], bool] | None = None, start: float | None = None,
+               end: float | None = None) -> SolvedBall:
+    """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
+
+    A track has one player: touches of others have the player "". Referees touch no ball. InputError where the source
+    has no ball then.
+    """
+    low, high = -np.inf if start is None else start, np.inf if end is None else end
+    part = (source.times >= low) & (source.times <= high)
+    if not part.any():
+        span = f"{source.times[0]:g} to {source.times[-1]:g} s"
+        raise InputError("times", f"no sample from {low:g} to {high:g} s", span)
+    if isinstance(source, Track):
+        unknown = ~source.ball_height_known[:, None] & [False, False, True]
+        ball = np.where(unknown, np.nan, source.ball)
+        return solve(source.times[part], ball[part], source.positions[None, part], [source.name], where=source.name,
+                     pitch=PITCH, progress=progress, cancelled=cancelled)
+    playing = [index for index, player in enumerate(source.players) if player.team != REFEREE]
+    players = [source.players[index] for index in playing]
+    return solve(source.times[part], source.ball[part], source.positions[playing][:, part],
+                 players=[player.id for player in players], teams=[player.team for player in players],
+                 pitch=(source.length, source.width), where=source.provider, progress=progress, cancelled=cancelled)

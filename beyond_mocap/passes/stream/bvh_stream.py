@@ -28,7 +28,6 @@ from ...files.bvh.bvh_text import BvhText, parse_data
 
 LONGEST = 1 << 20
 """Bytes of a line or a hierarchy; more is rubbish."""
-
 _LARGEST = 1e7
 _END = re.compile(rb"\|\||\n")
 _SENT = re.compile(r"#\s*sent\s+([0-9.]+)")

@@ -29,10 +29,8 @@ LOOPBACK = "127.0.0.1"
 PORT = 7001
 PROTOCOLS = ("udp", "tcp", "call")
 """Datagrams that come in; who connects to us; or we call who waits for it, as Axis Neuron does."""
-
 STALLED = 1.0
 """Seconds without a frame after which a stream has stalled."""
-
 _SPOKEN = {"udp": "UDP", "tcp": "TCP", "call": "TCP"}
 _TICK = 0.2
 _CHUNK = 1 << 16
@@ -75,10 +73,8 @@ class Listener:
     """Receives one stream at a time. protocol: of PROTOCOLS. hierarchy: text of a BVH HIERARCHY for streams without
     one. unit: metres per unit of the stream (None: guessed). seconds: that frames are kept."""
 
-    def __init__(
-        self, port: int = PORT, protocol: str = "udp", hierarchy: str | None = None, unit: float | None = None,
-        seconds: float = 20.0,
-    ):
+    def __init__(self, port: int = PORT, protocol: str = "udp", hierarchy: str | None = None, unit: float | None = None,
+                 seconds: float = 20.0):
         if protocol not in PROTOCOLS:
             raise InputError("protocol", f"{protocol!r}", f"one of {', '.join(PROTOCOLS)}")
         if not 1024 <= int(port) <= 65535:
@@ -107,10 +103,8 @@ class Listener:
                     self._server.listen(1)
             except OSError as error:
                 self._server.close()
-                raise InputError(
-                    f"port {self.port}", f"cannot be listened to ({error.strerror or error})", "a free port",
-                    "choose another one, or stop the program that listens there",
-                ) from None
+                raise InputError(f"port {self.port}", f"cannot be listened to ({error.strerror or error})",
+                                 "a free port", "choose another one, or stop the program that listens there") from None
         self._thread = threading.Thread(target=self._run, name="beyond_mocap stream", daemon=True)
         _alive.add(self)
         self._thread.start()

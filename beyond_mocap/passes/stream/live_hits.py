@@ -15,7 +15,6 @@ from .listener import Arrived, Listener, poses
 
 WINDOW = 4.0
 """Seconds that are looked at."""
-
 _RATE = 60.0
 _LEAST = 0.5
 _SETTLED = 0.05
@@ -24,10 +23,8 @@ _SETTLED = 0.05
 class LiveHits:
     """Watches a listener for hits of a part. side: "left", "right", or "" for either. threshold: as in `analyse`."""
 
-    def __init__(
-        self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
-        tool: Tool | None = None,
-    ):
+    def __init__(self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
+                 tool: Tool | None = None):
         self.listener, self.part, self.threshold, self.tool = listener, part, threshold, tool
         sided = part in ("foot", "hand", "tool")
         self.sides = ((side,) if side else ("left", "right")) if sided else ("",)

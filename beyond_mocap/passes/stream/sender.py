@@ -17,7 +17,6 @@ from .listener import LOOPBACK
 FORMS = ("bvh", "neuron")
 WAYS = ("udp", "tcp", "serve")
 """Datagrams; connecting to who listens; or waiting for who calls, as Axis Neuron does."""
-
 _HEADER_EVERY = 1.0
 _TICK = 0.2
 _AVATAR = "0 Avatar00 "
@@ -28,9 +27,8 @@ class Sender:
     """Sends a BVH file. way: of WAYS. form: of FORMS. rate: frames a second (None: the file's).
     loop: again and again."""
 
-    def __init__(
-        self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None, loop: bool = False
-    ):
+    def __init__(self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None,
+                 loop: bool = False):
         if way not in WAYS or form not in FORMS:
             raise InputError("stream", f"{way}, {form}", f"one of {', '.join(WAYS)} and one of {', '.join(FORMS)}")
         text = bvh_text.parse(path)

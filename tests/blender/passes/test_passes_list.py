@@ -28,10 +28,10 @@ def asked(room):
 
 
 def test_every_sample_can_be_chosen(core, room):
-    assert {name for name, *_ in room("settings").SAMPLES} == set(core("passes.sample_scenes").SAMPLES)
+    assert {name for name, *_ in room("settings").SAMPLES} == set(core("passes.scene_json").SAMPLES)
     for name in NAMES:
         press(bpy.ops.beyond_mocap.passes_sample, sample=name)
-        assert len(asked(room).passes) == len(core("passes.sample_scenes").SAMPLES[name]["passes"])
+        assert len(asked(room).passes) == len(core("passes.scene_json").SAMPLES[name]["passes"])
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from beyond_mocap.ball.arcs import arcs, out_of_reach
 from beyond_mocap.ball.physics import THROWN, Ball
+from beyond_mocap.ball.shot import arcs, is_out_of_reach
 
 
 def test_without_air_the_slowest_launch_is_the_known_one():
@@ -21,5 +21,5 @@ def test_a_target_is_out_of_reach_just_below_the_slowest_launch():
     ball, start = THROWN["baseball"], np.array([0.0, 0.0, 1.5])
     for target in ((80.0, 0.0, 1.0), (30.0, 40.0, 6.0)):
         slowest = arcs(start, np.array(target), ball).slowest
-        assert out_of_reach(start, np.array(target), ball, 0.93 * slowest)
-        assert not out_of_reach(start, np.array(target), ball, slowest)
+        assert is_out_of_reach(start, np.array(target), ball, 0.93 * slowest)
+        assert not is_out_of_reach(start, np.array(target), ball, slowest)

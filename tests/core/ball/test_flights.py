@@ -5,8 +5,7 @@ import pytest
 
 from beyond_mocap.ball.batch import courses
 from beyond_mocap.ball.physics import FOOTBALL
-from beyond_mocap.ball.tracked.coarse import coarse_courses
-from beyond_mocap.ball.tracked.fit import fit_launches, gathered
+from beyond_mocap.ball.tracked.fit import coarse_courses, fit_launches, gathered
 from beyond_mocap.ball.tracked.solve import solve
 
 STEP = 0.04

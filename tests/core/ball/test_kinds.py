@@ -5,10 +5,9 @@ import csv
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.tracked.ends import ball_ends
-from beyond_mocap.ball.tracked.kinds import keeper_kind, keepers, kind_of, leaves_line, part_of
+from beyond_mocap.ball.tracked.kinds import ball_ends, keeper_kind, keepers, kind_of, leaves_line, part_of
 from beyond_mocap.ball.tracked.solve import SolvedTouch, solve
-from beyond_mocap.ball.tracked.who import choose
+from beyond_mocap.ball.tracked.touches import choose_players
 from beyond_mocap.files.tables import TOUCH_COLUMNS, write_touches
 
 
@@ -80,7 +79,7 @@ def test_the_ball_over_the_touch_line_comes_back_by_a_throw_in():
 def test_of_two_near_players_he_has_it_who_had_it():
     away = np.array([[0.3, 0.5, 0.3], [2.0, 0.45, 2.0]])
     between = np.array([[0.0, 0.6, 0.6], [3.0, 2.5, 2.5]])
-    assert choose(away, np.array([0.0, 0.5, 1.0]), between).tolist() == [0, 0, 0]
+    assert choose_players(away, np.array([0.0, 0.5, 1.0]), between).tolist() == [0, 0, 0]
 
 
 def test_touches_as_a_table(tmp_path):

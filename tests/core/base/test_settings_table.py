@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from settings_page import PAGE, settings_page
+from pages import SETTINGS_PAGE, settings_page
 
 from beyond_mocap.ball.physics import THROWN
 from beyond_mocap.base import settings
@@ -99,7 +99,7 @@ def test_a_row_is_on_the_page_of_settings(with_sharpness):
 
 
 def test_the_page_of_settings_is_up_to_date():
-    assert PAGE.read_text("utf-8") == settings_page(), "run python packaging/settings_page.py"
+    assert SETTINGS_PAGE.read_text("utf-8") == settings_page(), "run python packaging/pages.py"
 
 
 def test_every_row_makes_sense():

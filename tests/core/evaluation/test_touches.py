@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.touch_score import Reading, ReadTouch, read_touches, scored, scored_by_events
+from benchmarks.ball_touches import Reading, ReadTouch, read_touches, scored, scored_by_events
 from beyond_mocap.base.errors import InputError
 
 READ = Reading(

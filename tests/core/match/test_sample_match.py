@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.solve_ball import solve_ball
+from beyond_mocap.ball.tracked.solve import solve_ball
 from beyond_mocap.files.tracking.tracking import read_match
 
 SAMPLE = pathlib.Path(__file__).parents[3] / "sample_blend"

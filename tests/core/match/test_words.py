@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from beyond_mocap.annotation import validate
 from beyond_mocap.annotation.event_words import TABLE, read_event_words
-from beyond_mocap.ball.solve_ball import solve_ball
-from beyond_mocap.ball.tracked.solve import SolvedTouch
+from beyond_mocap.ball.tracked.solve import SolvedTouch, solve_ball
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.match.words import (
     LEAST_CONFIDENCE,

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.passes.alike import alike, bones
-from beyond_mocap.passes.links import BONES, BoneWeights, aligned
+from beyond_mocap.passes.links import BONES, BoneWeights, aligned, measure_bones, weigh_bones
 from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.path_costs import Alike, PathCosts, Weights
@@ -36,7 +35,7 @@ def test_it_is_equation_1(library):
         for part, own in enumerate((weights.position, weights.velocity)):
             way = poses[0][part][:, None, bone] - poses[1][part][None, :, bone]
             by_hand += own[bone] * np.linalg.norm(way, axis=-1)
-    rows = alike(library, weights)
+    rows = weigh_bones(library, weights)
     found = pose_distance(rows[first + at.astype(int)], rows[other + at.astype(int)])
     np.testing.assert_allclose(found * sum(BoneWeights().position), by_hand, rtol=1e-3, atol=1e-3)
 
@@ -44,14 +43,14 @@ def test_it_is_equation_1(library):
 def test_the_search_pays_for_it(library, costs):
     """A cut's price is eq. 1 where it is given, the mean over the frames around it; and the weights steer it."""
     ends, start = np.array([40.0, 90.0]), np.arange(200.0, 260.0)
-    rows = alike(library)
+    rows = weigh_bones(library)
     one = dict(costs(alike=Alike(rows)).cut_terms(ends, start))["pose"]
     at = ends.astype(int), start.astype(int)
     np.testing.assert_allclose(one, Weights().pose * pose_distance(rows[at[0]], rows[at[1]]), rtol=1e-3, atol=1e-3)
     around = dict(costs(alike=Alike(rows, (-6, 6))).cut_terms(ends, start))["pose"]
     assert not np.allclose(one, around, rtol=0.02)
     hands = BoneWeights((0.0, 0.0, 8.0, 0.0, 0.0, 0.0), (0.0,) * 6)
-    other = dict(costs(alike=Alike(alike(library, hands))).cut_terms(ends, start))["pose"]
+    other = dict(costs(alike=Alike(weigh_bones(library, hands))).cut_terms(ends, start))["pose"]
     assert np.any(np.argsort(one[0]) != np.argsort(other[0]))
 
 
@@ -63,6 +62,6 @@ def test_without_it_the_features_count_as_ever(library, costs):
 
 
 def test_a_pose_is_like_itself_wherever_it_stands(library):
-    rows = bones(library)
+    rows = measure_bones(library)
     assert rows.shape == (len(library.frames), 2 * len(BONES), 3) and np.all(np.isfinite(rows))
     np.testing.assert_allclose(np.abs(rows[:, 0, :2]).max(), 0.0, atol=1e-6)

@@ -12,7 +12,7 @@ from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track.ball_path import BallPath
 from beyond_mocap.passes.bodies import least_seconds, player_motion
-from beyond_mocap.passes.orders import HitOrder, Stance
+from beyond_mocap.passes.way import HitOrder, Stance
 
 FPS, RADIUS = 30.0, 0.105
 

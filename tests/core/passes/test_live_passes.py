@@ -11,8 +11,7 @@ from beyond_mocap.files.bvh import bvh
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.passes.hits import analyse
 from beyond_mocap.passes.live_passes import FADE, answer, begin
-from beyond_mocap.passes.sample_scenes import SAMPLES
-from beyond_mocap.passes.scene_json import parse_scene
+from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 CLIPS = Path(__file__).resolve().parents[3] / "sample_blend" / "passes" / "library"
 

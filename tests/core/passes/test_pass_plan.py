@@ -15,8 +15,7 @@ from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import at_frames, pose_kinematics
 from beyond_mocap.passes.pass_court import ON_TARGET
 from beyond_mocap.passes.passes import ball_of, ball_path, planned
-from beyond_mocap.passes.sample_scenes import SAMPLES
-from beyond_mocap.passes.scene_json import parse_scene
+from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 
 
 def scene_of(name="three", **changes):

@@ -19,8 +19,7 @@ from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.passes.links import BONES, BoneWeights
 from beyond_mocap.passes.pass_scene import Weights
 from beyond_mocap.passes.passes import ball_of, bone_weights, passes
-from beyond_mocap.passes.sample_scenes import SAMPLES
-from beyond_mocap.passes.scene_json import parse_scene
+from beyond_mocap.passes.scene_json import SAMPLES, parse_scene
 from beyond_mocap.synthesis.provenance import read_provenance
 
 TALL = {

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.passes import links
 from beyond_mocap.passes.pass_scene import BONES, GROUND, Example, PassScene, served_by
-from beyond_mocap.passes.sample_scenes import SAMPLES as KEPT
+from beyond_mocap.passes.scene_json import SAMPLES as KEPT
 from beyond_mocap.passes.scene_json import parse_scene, read_scene, scene_dict, scene_text
 
 SAMPLES = sorted((Path(__file__).resolve().parents[3] / "sample_blend" / "passes").glob("*.json"))

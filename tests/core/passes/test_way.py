@@ -7,8 +7,7 @@ import pytest
 
 from beyond_mocap.base.easing import quintic_between
 from beyond_mocap.motion import quaternion
-from beyond_mocap.passes.orders import HitOrder, Stance
-from beyond_mocap.passes.way import SPEEDING, needed, placed, walked, way
+from beyond_mocap.passes.way import SPEEDING, HitOrder, Stance, needed, placed, walked, way
 
 STILL = np.zeros(2)
 

@@ -6,8 +6,7 @@ import pytest
 from beyond_mocap.motion.path.arc_length import ArcLength
 from beyond_mocap.path_editing.apart import Limits, resolved
 from beyond_mocap.path_editing.collisions import collisions
-from beyond_mocap.path_editing.detour import with_detours
-from beyond_mocap.path_editing.follower import Change, Follower
+from beyond_mocap.path_editing.detour import Change, Follower, with_detours
 from beyond_mocap.path_editing.path_line import through
 
 FPS = 30.0

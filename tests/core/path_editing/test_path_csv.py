@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from beyond_mocap.base.errors import InputError
-from beyond_mocap.path_editing.path_csv import read_curve
+from beyond_mocap.path_editing.path_line import read_curve
 
 
 @pytest.mark.parametrize("content, points", [

@@ -9,7 +9,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion import contacts
 from beyond_mocap.motion.motion import place
 from beyond_mocap.motion.path.arc_length import ArcLength
-from beyond_mocap.path_editing.path_fit import fit, fit_polynomial, fit_spline, places_on_ground
+from beyond_mocap.path_editing.path_frame import fit_path, fit_polynomial, fit_spline, places_on_ground
 from beyond_mocap.synthetic.gait import gait
 
 TIMES = np.arange(600) / 60.0
@@ -52,7 +52,7 @@ def test_the_path_of_a_flat_walk_lies_on_its_ground(height, floor):
     standing = contacts.points(motion)
     places = places_on_ground(motion, standing)
     assert np.ptp(places[:, 2]) == 0.0 and abs(places[0, 2] - contacts.recorded_floor(motion)[0]) < 1e-9
-    for path in (fit(motion, standing), fit(motion, standing, "polynomial", 5)):
+    for path in (fit_path(motion, standing), fit_path(motion, standing, "polynomial", 5)):
         assert path.domain == pytest.approx((0.0, motion.duration))
         assert np.linalg.norm(path.at(np.arange(len(motion)) / 30.0) - places, axis=1).max() < 0.1
 
@@ -93,7 +93,7 @@ def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
     hill = replace(motion, root_positions=root)
     truth = floor + slope * (root[:, 0] - root[0, 0])
     assert np.abs(places_on_ground(hill, standing)[:, 2] - truth).max() < 0.12
-    path = fit(hill, standing)
+    path = fit_path(hill, standing)
     times = np.arange(len(hill)) / 30.0
     assert np.abs(path.at(times)[:, 2] - truth)[15:-15].max() < 0.08
 
@@ -101,7 +101,7 @@ def test_the_ground_under_a_walk_up_a_hill_rises_with_it(slope):
 @pytest.mark.parametrize("frames, degree", ((90, 45), (360, 120), (30, 29)))
 def test_a_high_degree_does_not_swing_between_few_frames(frames, degree):
     motion = gait(1.4, frames / 30.0, 30.0).frames(0, frames)
-    path = fit(motion, contacts.points(motion), "polynomial", degree)
+    path = fit_path(motion, contacts.points(motion), "polynomial", degree)
     places = path.at(np.arange(frames) / 30.0)
     assert ArcLength(path).length < 1.03 * np.linalg.norm(np.diff(places, axis=0), axis=1).sum()
     assert np.linalg.norm(places - places_on_ground(motion, contacts.points(motion)), axis=1).max() < 0.02

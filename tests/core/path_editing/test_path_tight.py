@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.path_editing.path_curvature import curvature, share
+from beyond_mocap.path_editing.ground_contact import curvature, share_free
 from beyond_mocap.path_editing.path_line import through
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
 from beyond_mocap.synthetic.gait import gait
@@ -78,5 +78,5 @@ def test_a_line_that_jitters_is_told_and_its_own_path_is_not(source):
 def test_feet_are_let_go_smoothly_within_the_stretch():
     free = np.zeros(90, dtype=bool)
     free[20:70] = True
-    much = share(free, 30.0)
+    much = share_free(free, 30.0)
     assert np.all(much[~free] < 1e-9) and np.allclose(much[30:60], 1.0) and np.abs(np.diff(much)).max() < 0.3

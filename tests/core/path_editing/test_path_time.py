@@ -14,8 +14,8 @@ from beyond_mocap.path_editing.path_time import (
     by_arc_length,
     by_time,
     by_way,
-    shown,
     stretched,
+    take_rows,
 )
 
 ROWS, FPS, STEP = 301, 30.0, 0.05
@@ -46,7 +46,7 @@ def own(residuals):
 
 def test_rows_between_rows_are_smooth(residuals):
     at = np.arange(0.0, ROWS - 1, 0.37)
-    rows = shown(residuals, at)
+    rows = take_rows(residuals, at)
     inside = (at > 1) & (at < ROWS - 2)
     truth = np.stack([np.sin(0.1 * at), 0.0 * at, np.cos(0.1 * at)], axis=1)
     assert np.abs(rows.place - truth)[inside].max() < 1e-4
@@ -56,7 +56,7 @@ def test_rows_between_rows_are_smooth(residuals):
 
 def test_whole_rows_are_the_rows_themselves(residuals):
     timing = by_arc_length(residuals, 1.0, 0.0)
-    assert shown(residuals, timing.at).rotations.tobytes() == residuals.rotations.tobytes()
+    assert take_rows(residuals, timing.at).rotations.tobytes() == residuals.rotations.tobytes()
 
 
 def test_a_level_way_asks_for_nothing(residuals):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.touch_score import Reading, ReadTouch, scored
+from benchmarks.ball_touches import Reading, ReadTouch, scored
 from beyond_mocap.ball.tracked.solve import solve
 from beyond_mocap.synthetic.ground_truth.planted import planted_match, sample_feed
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import Launch, find_crossing, fly
 from beyond_mocap.ball.physics import BASEBALL
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify
@@ -17,7 +16,7 @@ from beyond_mocap.throws.letting_go import InHand, grip_point
 
 def impact(found, target):
     flight = fly(Launch(0.0, found.position, found.velocity, found.spin), BASEBALL, 3.0)
-    return float(np.linalg.norm(crossing(flight, target) - target))
+    return float(np.linalg.norm(find_crossing(flight, target) - target))
 
 
 @pytest.mark.parametrize("freedom", [Freedom(), Freedom.anchored()])

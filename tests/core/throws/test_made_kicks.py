@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.ball.contact import striking_surface
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import Launch, find_crossing, fly
 from beyond_mocap.ball.physics import FOOTBALL
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.humanoid import identify
@@ -37,7 +36,7 @@ def test_the_ball_flies_through_the_target(made):
     kicked, target, speed = made
     assert abs(np.linalg.norm(kicked.velocity) - speed) < 1e-6
     flight = fly(Launch(0.0, kicked.ball, kicked.velocity, kicked.spin), FOOTBALL, 4.0)
-    assert np.linalg.norm(crossing(flight, target) - target) < 0.05
+    assert np.linalg.norm(find_crossing(flight, target) - target) < 0.05
 
 
 def test_the_foot_meets_the_ball_and_gives_it_this_launch(made):

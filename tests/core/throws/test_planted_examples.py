@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation import read_clip_annotations
+from beyond_mocap.ball.flight import meet_wall
 from beyond_mocap.ball.physics import BASEBALL
-from beyond_mocap.ball.wall import meets_wall
 from beyond_mocap.base.errors import Cancelled, InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
@@ -48,7 +48,7 @@ def test_the_ball_leaves_near_the_hand_and_flies_through_the_impact(folder):
         impact = np.array([float(row[f"target_{axis}_m"]) for axis in "xyz"])
         assert abs(np.linalg.norm(launch) - float(row["speed_m_s"])) < 1e-4
         ahead = launch[:2] / np.linalg.norm(launch[:2])
-        place, _ = meets_wall(hand, launch, BASEBALL, impact[:2], ahead)
+        place, _ = meet_wall(hand, launch, BASEBALL, impact[:2], ahead)
         assert np.linalg.norm(place - impact) < 0.5  # the ball lies in the fingers, not in the wrist
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.annotation.striking import FOOT_RADIUS, ball_gap
-from beyond_mocap.ball.flight import Launch, fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import Launch, find_crossing, fly
 from beyond_mocap.ball.physics import FOOTBALL
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
@@ -51,7 +50,7 @@ def test_a_kick_hits_another_target(lies):
     part = AtFoot("right", start if lies else None)
     found = corrected(made.motion, part, frame, target, FOOTBALL, Freedom.anchored())
     flight = fly(Launch(0.0, found.position, found.velocity, found.spin), FOOTBALL, 3.0)
-    assert np.linalg.norm(crossing(flight, target) - target) < 0.02 and found.moved < 0.10
+    assert np.linalg.norm(find_crossing(flight, target) - target) < 0.02 and found.moved < 0.10
     if lies:
         assert np.allclose(found.position, start)
     # the foot touches the ball then, and was not in it a frame before

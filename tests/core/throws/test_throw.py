@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from beyond_mocap.ball.flight import fly
-from beyond_mocap.ball.impact import crossing
+from beyond_mocap.ball.flight import find_crossing, fly
 from beyond_mocap.base.errors import InputError
 from beyond_mocap.cli.main import main
 from beyond_mocap.files.bvh import bvh
@@ -40,7 +39,7 @@ def test_hits_what_it_is_aimed_at(model, order):
     thrown = throw_at(model, order)
     target = np.maximum(order.target, [-np.inf, -np.inf, thrown.ball.radius])
     flight = fly(thrown.launch, thrown.ball, 4.0)
-    assert np.linalg.norm(crossing(flight, target) - target) < 0.02
+    assert np.linalg.norm(find_crossing(flight, target) - target) < 0.02
     assert thrown.impact_error < 0.02 and thrown.moved < 0.05 and not thrown.warnings
     assert abs(np.degrees(thrown.turned)) < 8.0
     if order.speed:
@@ -115,7 +114,7 @@ def test_within_a_longer_motion_the_ball_flies_as_it_did(model):
     left = grip_point(whole.motion, InHand("right", thrown.grip), np.array([whole.release * 30.0]))[0, 0]
     assert np.linalg.norm(left - thrown.launch.position) < 1e-3
     assert np.allclose(whole.launch.velocity, thrown.launch.velocity)
-    assert np.linalg.norm(crossing(whole.flight, thrown.target) - thrown.target) < 0.02
+    assert np.linalg.norm(find_crossing(whole.flight, thrown.target) - thrown.target) < 0.02
 
 
 @pytest.mark.parametrize("order, says", [

@@ -1,17 +1,21 @@
-"""Everybody of a made match together: who is in whom, what keeping them apart costs, and who is in step with whom.
+"""What players of a match cost, and how all of them get on together.
 
-Overlaps, skate and jerk stand without and with the corrections; the share in step is that of the time of all players.
+`speed_section`: processor seconds of search, construction and polishing per 20 s of motion, and of reading and cleaning
+a whole half. `crowd_section`: who is in whom, what keeping them apart costs, and who is in step with whom; overlaps,
+skate and jerk without and with the corrections; the share in step is that of the time of all players.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.effort import seconds
+from benchmarks.effort import format_head, format_row, seconds
 from benchmarks.places import CMU_UNIT, DATA
+from beyond_mocap.files.tracking.tracking import Match, read_match
 from beyond_mocap.library.build import build
 from beyond_mocap.library.library import Library
 from beyond_mocap.match.crowd.correction import ARMS, ROOT, Correction, applied
@@ -22,12 +26,24 @@ from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.motion.motion import Motion, forward_kinematics
+from beyond_mocap.motion.track import clean, sample
+from beyond_mocap.synthesis.plan import Plan
 from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
 from beyond_mocap.synthesis.quality.jerk import jerk
+from beyond_mocap.synthesis.resolve_plan import resolve_plan
+from beyond_mocap.synthesis.search.path_costs import balanced
+from beyond_mocap.synthesis.search.path_search import PathSearch
+from beyond_mocap.synthesis.search.wanted import build_order
+from beyond_mocap.synthesis.search_library import search_library
+from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthesis.take import Take
 
 SECONDS = (1480.0, 1500.0)
 """Of the recorded half: players stand close together, so that there is something to keep apart."""
+WINDOW = 60.0
+STARTS = (60.0, 600.0, 1200.0, 1800.0, 2400.0)
+EVERY = 4
+"""Of the players each fourth is measured, in windows that go round."""
 
 
 def step_share(library: Library, takes: list[Take], firsts: list[int]) -> float:
@@ -74,14 +90,12 @@ def what_is_changed(corrections: list[Correction], takes: list[Take], firsts: li
     )
 
 
-def section() -> list[str]:
+def crowd_section() -> list[str]:
     """Lines for results.md: SECONDS of a recorded half, made and measured."""
     with tempfile.TemporaryDirectory() as place:
         folder, cache, recordings = Path(place) / "match", Path(place) / "cache", DATA / "mocap" / "cmu10"
-        order = MatchOrder(
-            DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache, unit=CMU_UNIT,
-            start=SECONDS[0], end=SECONDS[1], figures=False,
-        )  # fmt: skip
+        order = MatchOrder(DATA / "tracking" / "match" / "nl2019_half1.dat", recordings, folder, cache=cache,
+                           unit=CMU_UNIT, start=SECONDS[0], end=SECONDS[1], figures=False)
         took, result = seconds(lambda: make_match(order), 1)
         library = build(recordings, unit=CMU_UNIT, cache_dir=cache)
         made = f"- {len(result.done)} players made in {took:.1f} s of processor time, {len(result.failed)} failed"
@@ -98,9 +112,56 @@ def crowd_lines(folder: Path, library: Library) -> list[str]:
     kept = [edit.correction or Correction.none(fps) for _, edit in pairs]
     corrected = [applied(*each) for each in zip(motions, kept, firsts)]
     took, _ = seconds(lambda: kept_apart(motions, contacts, firsts, fps), 1)
-    return [
-        f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
-        f"without corrections: {figures(motions, contacts, firsts)}",
-        f"with them: {figures(corrected, contacts, firsts)}",
-        what_is_changed(kept, takes, firsts), f"kept apart anew in {took:.1f} s of processor time",
-    ]
+    return [f"{len(takes)} takes; in step {100 * step_share(library, takes, firsts):.2f}%",
+            f"without corrections: {figures(motions, contacts, firsts)}",
+            f"with them: {figures(corrected, contacts, firsts)}", what_is_changed(kept, takes, firsts),
+            f"kept apart anew in {took:.1f} s of processor time"]
+
+
+def windows(match: Match) -> list[tuple[str, float]]:
+    """(player, start in s) of what is measured."""
+    ids = [player.id for player in match.players][::EVERY]
+    return [(player, STARTS[number % len(STARTS)]) for number, player in enumerate(ids)]
+
+
+def window_row(library: Library, match: Match, player: str, start: float) -> str:
+    """One player over one window: the search alone, and everything, per 20 s."""
+    track, _ = clean(match.track(player, start, start + WINDOW))
+    plan = Plan(track=track, nearest=True)
+    resolved = resolve_plan(plan, library)
+    known = search_library(library, resolved)
+    order, weights = build_order(known, resolved), balanced(plan.alpha)
+    searched, _ = seconds(lambda: PathSearch(known, order, weights).run())
+    whole, take = seconds(lambda: synthesize(library, plan))
+    share = 20.0 / (track.times[-1] - track.times[0])
+    cells = [player, f"{start:g}", f"{np.mean(order.track.speed):.2f}", str(len(take.seams))]
+    return format_row([*cells, f"{share * searched:.3f}", f"{share * whole:.3f}"])
+
+
+def half_row(match: Match) -> str:
+    """One player's whole half, cleaned and sampled."""
+    track = match.track(match.players[0].id)
+    cleaned, (known, _) = seconds(lambda: clean(track))
+    sampled, _ = seconds(lambda: sample(known, 30.0))
+    minutes = (track.times[-1] - track.times[0]) / 60
+    return format_row([match.players[0].id, f"{minutes:.1f}", f"{cleaned:.3f}", f"{sampled:.3f}"])
+
+
+def peak_memory() -> str:
+    """What the process has held at most."""
+    import resource
+
+    kilo = 1024 if sys.platform == "darwin" else 1
+    return f"{resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024 / kilo:.0f} MiB at most in this process"
+
+
+def speed_section() -> list[str]:
+    """Lines for results.md."""
+    with tempfile.TemporaryDirectory() as cache:
+        library = build(DATA / "mocap" / "cmu10", unit=CMU_UNIT, cache_dir=cache)
+        match = read_match(DATA / "tracking" / "match" / "nl2019_half1.dat", cache_dir=cache)
+        lines = format_head(("player", "from, s", "mean m/s", "seams", "search, s per 20 s",
+                             "all, s per 20 s (target 0.35)"))
+        lines += [window_row(library, match, *window) for window in windows(match)]
+        lines += ["", *format_head(("player", "min", "clean, s", "sample, s")), half_row(match), "", peak_memory()]
+    return lines

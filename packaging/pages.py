@@ -1,4 +1,5 @@
-"""docs/settings.md, made from the table of settings: `python packaging/settings_page.py` in the project's folder."""
+"""Pages made from the code: docs/settings.md from the table of settings, and the tables of providers in
+docs/match/match-input.md from their records. `python packaging/pages.py` in the project's folder writes both."""
 
 from __future__ import annotations
 
@@ -8,11 +9,12 @@ from itertools import groupby
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[1]
-PAGE = TOP / "docs" / "settings.md"
+SETTINGS_PAGE = TOP / "docs" / "settings.md"
+PROVIDERS_PAGE = TOP / "docs" / "match" / "match-input.md"
 HEAD = """# Settings
 
 All settings, by feature. This page is made from the table in `beyond_mocap/base/settings` by
-`python packaging/settings_page.py`; a test checks that it is up to date. Options are those of the command line, panel
+`python packaging/pages.py`; a test checks that it is up to date. Options are those of the command line, panel
 names those in Blender. Files and objects that are only read or written are on the feature's own page.
 """
 COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")
@@ -81,6 +83,20 @@ def _line(cells) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |\n"
 
 
+def with_tables(text: str) -> str:
+    """The page of providers with the rows of both tables, in their order, as the records have them."""
+    from beyond_mocap.files.event_providers import EVENT_PROVIDERS
+    from beyond_mocap.files.tracking.providers import PROVIDERS
+
+    tables = iter((PROVIDERS, EVENT_PROVIDERS))
+
+    def rows(head):
+        return head[1] + "".join(f"| {one.title} | {one.files} |\n" for one in next(tables).values())
+
+    return re.sub(r"(?m)^(\| provider \|.*\n\|-.*\n)(?:\|.*\n)*", rows, text)
+
+
 if __name__ == "__main__":
     sys.path.insert(0, str(TOP))
-    PAGE.write_text(settings_page(), "utf-8")
+    SETTINGS_PAGE.write_text(settings_page(), "utf-8")
+    PROVIDERS_PAGE.write_text(with_tables(PROVIDERS_PAGE.read_text("utf-8")), "utf-8")
