@@ -21,8 +21,8 @@ from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation
 from ..motion.retargeting.neutral import neutral_stance
 from ..motion.skeleton import Skeleton
-from ..synthesis.construct.ball.carry import Body, Resting, leg, limb_carried
-from ..synthesis.construct.ball.meeting import eased
+from ..synthesis.construct.carry import Body, Resting, leg, limb_carried
+from ..synthesis.construct.meeting import eased
 from ..synthesis.construct.stepped_over import stepped_over
 from ..synthesis.quality.jerk import jerk, uncut_windows, windowed
 

@@ -19,7 +19,7 @@ from ..motion import quaternion
 from ..motion.between_frames import cubic_at
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics, pose_kinematics
-from ..synthesis.construct.ball.carry import arm, leg
+from ..synthesis.construct.carry import arm, leg
 from .struck import struck
 
 BEFORE, AFTER = 0.4, 0.4

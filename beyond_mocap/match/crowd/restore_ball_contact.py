@@ -12,11 +12,11 @@ from ...annotation.ball_contact import surfaces
 from ...annotation.striking import ball_gap
 from ...motion.motion import Motion, pose_kinematics
 from ...motion.track import BALL_RADIUS
-from ...synthesis.construct.ball.strike_at import Meeting, met_at
+from ...synthesis.construct.strike_at import Meeting, met_at
 from ...synthesis.take import KeyResult, Take
 
 CLOSED = 0.15
-"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more
+"""Metres of gap that are closed, as much as `synthesis.construct.strike` closes; who misses the ball by more
 plays as he does."""
 
 OPEN = 1e-3

@@ -7,7 +7,7 @@ import numpy as np
 from ...annotation.striking import Surface
 from ...motion import quaternion
 from ...motion.humanoid import identify
-from .ball.carry import Body
+from .carry import Body
 
 _SOLE, _ROUNDING = 0.02, 0.03  # metres of the lowest foot joint above the ground, and over which it nears that
 

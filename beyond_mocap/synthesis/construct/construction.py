@@ -25,7 +25,7 @@ from ...motion.track import SampledTrack
 from ..own_size import real_ball
 from ..resolved_plan import ResolvedPlan
 from ..search.footage import Footage, overlap
-from .ball.strike import Touch, strike
+from .strike import Touch, strike
 from .banking import banked, missing_lean
 from .cross_fade import faded_rotations, faded_values, share
 from .face_ball import turned_to_ball

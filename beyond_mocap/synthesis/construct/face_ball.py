@@ -15,11 +15,11 @@ from ...annotation.ball_contact import surfaces
 from ...annotation.striking import faster_middle
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
-from .ball.strike import Touch
+from .strike import Touch
 
 MOST = np.radians(60.0)
 ALMOST = 0.25
-"""Metres between ball and part that the ball's noise and the limb make up for (`synthesis.construct.ball.strike`)."""
+"""Metres between ball and part that the ball's noise and the limb make up for (`synthesis.construct.strike`)."""
 
 SECONDS = 0.5
 """Before and after the key frame over which the turn grows and fades."""

@@ -15,8 +15,8 @@ from ...motion.foot_plant import shift
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics, world_rotation
 from ...motion.skeleton import Skeleton
-from .ball.carry import Body, Resting, leg, limb_carried
-from .ball.meeting import eased
+from .carry import Body, Resting, leg, limb_carried
+from .meeting import eased
 
 Pose = tuple[np.ndarray, np.ndarray]
 

@@ -11,7 +11,7 @@ from ..search.edit_list import EditList
 from ..search.footage import Shown
 from ..search.wanted import Wanted, needed
 from ..take import KeyResult
-from .ball.strike import Touch
+from .strike import Touch
 
 OTHERWISE = 0.4
 """Seconds before and after a key moment that nothing in the library shows in which the body comes to the ball and goes

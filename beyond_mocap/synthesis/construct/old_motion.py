@@ -9,7 +9,7 @@ import numpy as np
 from ...motion import quaternion
 from ...motion.track import SampledTrack
 from ...motion.track.sampling import MOVING_SPEED
-from .ball.meeting import eased
+from .meeting import eased
 from .on_track import pulled_to_track
 
 MOST_TURN = 1.5 * np.pi

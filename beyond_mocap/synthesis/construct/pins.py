@@ -23,7 +23,7 @@ from ...motion.humanoid import Humanoid, heading_from_positions, identify
 from ...motion.motion import Motion, pose_kinematics
 from ...motion.reach import two_bone
 from ...motion.skeleton import Skeleton
-from .ball.carry import arm, leg
+from .carry import arm, leg
 
 FADE = 0.3
 """Seconds before and behind a pin in which the body comes to it and leaves it."""

@@ -5,15 +5,8 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.synthesis.construct.ball.carry import (
-    LEAST_ANGLE,
-    MOST_ANGLE,
-    Body,
-    Resting,
-    leg,
-    limb_carried,
-    swing_to,
-    swung,
+from beyond_mocap.synthesis.construct.carry import (
+    LEAST_ANGLE, MOST_ANGLE, Body, Resting, leg, limb_carried, swing_to, swung,
 )
 from beyond_mocap.synthetic.gait import gait
 

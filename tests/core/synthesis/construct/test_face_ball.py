@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.annotation.ball_contact import surfaces
 from beyond_mocap.motion.motion import pose_kinematics
-from beyond_mocap.synthesis.construct.ball.strike import Touch
+from beyond_mocap.synthesis.construct.strike import Touch
 from beyond_mocap.synthesis.construct.construction import apply_heading
 from beyond_mocap.synthesis.construct.face_ball import MOST, turned_to_ball
 from beyond_mocap.synthetic.gestures import strike as made_strike

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import ball_gap, nearest_on
-from ....base.easing import quintic_step_by_powers
-from ....base.vectors import unit_vectors
-from ....motion.quaternion import turned_about_up
-from ....motion.track import BALL_RADIUS
+from ...annotation.striking import ball_gap, nearest_on
+from ...base.easing import quintic_step_by_powers
+from ...base.vectors import unit_vectors
+from ...motion.quaternion import turned_about_up
+from ...motion.track import BALL_RADIUS
 
 BALL_SECONDS = 0.3
 """Seconds before and after a key moment over which the ball's shift grows and fades."""

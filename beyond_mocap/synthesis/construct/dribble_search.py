@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import nearest_on
-from ....ball.roll import rolls, speeds_of
-from ....base.runs import runs
-from ....motion.track import BALL_RADIUS
+from ...annotation.striking import nearest_on
+from ...ball.roll import rolls, speeds_of
+from ...base.runs import runs
+from ...motion.track import BALL_RADIUS
 from .legs import SLOW, Legs
 from .meeting import touching_places
 

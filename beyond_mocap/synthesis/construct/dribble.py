@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....motion.skeleton import Skeleton
+from ...motion.skeleton import Skeleton
 from .dribble_search import SOONEST, Between, Push, Search
 from .legs import Legs
 from .meeting import lead

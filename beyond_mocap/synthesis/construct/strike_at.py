@@ -1,6 +1,6 @@
 """A part of the body brought to a ball that stays where it is: the ball's flight is given, the body meets it.
 
-`synthesis.construct.ball.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
+`synthesis.construct.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
 the shortest way that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by
 bending the spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and
 its landing.
@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....annotation.striking import Surface, ball_gap, nearest_on
-from ....motion.humanoid import identify
-from ....motion.motion import Motion
-from ..above_ground import above_ground
+from ...annotation.striking import Surface, ball_gap, nearest_on
+from ...motion.humanoid import identify
+from ...motion.motion import Motion
+from .above_ground import above_ground
 from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import eased
 

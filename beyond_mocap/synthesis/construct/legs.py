@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....annotation.striking import Surface, part_surfaces
-from ....motion import quaternion
-from ....motion.humanoid import heading_from_positions, identify
-from ....motion.motion import pose_kinematics
-from ....motion.skeleton import Skeleton
-from ....motion.track import BALL_RADIUS, zero_phase_hann
+from ...annotation.striking import Surface, part_surfaces
+from ...motion import quaternion
+from ...motion.humanoid import heading_from_positions, identify
+from ...motion.motion import pose_kinematics
+from ...motion.skeleton import Skeleton
+from ...motion.track import BALL_RADIUS, zero_phase_hann
 
 SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0
 """Metres about the line of a shin, and about that of the toes beyond their joint, which the ball keeps out of."""

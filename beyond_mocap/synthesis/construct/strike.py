@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
-from ....annotation.labels import list_labels
-from ....annotation.striking import Surface, ball_gap, part_surfaces
-from ....base.vectors import unit_vector
-from ....motion.humanoid import Limb, heading_from_positions, identify
-from ....motion.motion import pose_kinematics
-from ....motion.skeleton import Skeleton
-from ....motion.track import BALL_RADIUS
-from ..above_ground import above_ground
+from ...annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
+from ...annotation.labels import list_labels
+from ...annotation.striking import Surface, ball_gap, part_surfaces
+from ...base.vectors import unit_vector
+from ...motion.humanoid import Limb, heading_from_positions, identify
+from ...motion.motion import pose_kinematics
+from ...motion.skeleton import Skeleton
+from ...motion.track import BALL_RADIUS
+from .above_ground import above_ground
 from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
 

@@ -14,13 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import Surface
-from ....motion import quaternion
-from ....motion.humanoid import Limb, identify
-from ....motion.limb import inner_angle
-from ....motion.motion import pose_kinematics
-from ....motion.reach import two_bone
-from ....motion.skeleton import Skeleton
+from ...annotation.striking import Surface
+from ...motion import quaternion
+from ...motion.humanoid import Limb, identify
+from ...motion.limb import inner_angle
+from ...motion.motion import pose_kinematics
+from ...motion.reach import two_bone
+from ...motion.skeleton import Skeleton
 
 MOST_BEND = {"head": 0.6, "chest": 0.35}
 """Radians that the whole spine bends at most."""
