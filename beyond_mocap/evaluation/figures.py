@@ -13,9 +13,10 @@ from ..library.automatic import automatic_words
 from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
-from ..synthesis.quality import feet, jerk, pieces, root
+from ..synthesis.quality import feet, movement
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
+from ..synthesis.quality.played import find_replayed, warp_rates
 from . import realism, words
 from .reference import source_poses
 from .view import View
@@ -31,25 +32,25 @@ def place(view: View) -> dict:
         "speed_coverage": {"above": None, "below": None},
     }
     if view.wanted is not None:
-        error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
+        error, unsmoothed = movement.root_error(pelvis, view.wanted, fps), movement.pelvis_error(pelvis, view.wanted)
         out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
         at_keys = [float(np.interp(m.asked.in_force, view.played.times, unsmoothed)) for m in view.moments]
         out["pelvis_error_m"] = {"mean": _mean(unsmoothed), "own": own, "keys": _mean(np.array(at_keys))}
     if view.wanted is not None and view.reference is not None:
-        asked = root.travel_speed(view.wanted, fps)
-        out["speed_coverage"] = root.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
+        asked = movement.travel_speed(view.wanted, fps)
+        out["speed_coverage"] = movement.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
     return {**out, **_surge(view)}
 
 
 def _surge(view: View) -> dict:
     """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind
     the window behind which the root is held to it."""
-    ours = root.surge(view.played.pelvis, view.fps)
-    own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
-    rms, real = _rms(ours), _rms(own)
+    ours = movement.surge(view.played.pelvis, view.fps)
+    own = movement.class_rms(view.own("surge"), movement.speed_class(view.own("speed")))
+    rms, real = _rms(ours), _rms(own[movement.speed_class(view.speed)])
     asked = None
     if view.wanted is not None:
-        asked = _rms(root.surge(zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW), view.fps))
+        asked = _rms(movement.surge(zero_phase_hann(view.wanted, view.fps, movement.ROOT_WINDOW), view.fps))
     surge = {"mean": rms, "own": real, "track": asked}
     return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
 
@@ -63,9 +64,10 @@ def _key(view: View, moment: Moment) -> dict:
     place: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
-        error = root.root_error(played.pelvis, view.wanted, view.fps)
+        error = movement.root_error(played.pelvis, view.wanted, view.fps)
+        unsmoothed = movement.pelvis_error(played.pelvis, view.wanted)
         place["position_error_m"] = float(np.interp(time, played.times, error))
-        place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
+        place["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
         place["ball_shift_m"] = ball_shift(played, _met_frame(played, moment, met_at), view.track)
     return {
         "time_s": moment.asked.time,
@@ -144,7 +146,7 @@ def _against_source(view: View) -> tuple[np.ndarray, float]:
     source = source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
     pure = np.isfinite(source[:, 0, 0])
     for seam in view.seams:
-        pure[max(seam - jerk.REACH, 0) : seam + jerk.REACH] = False
+        pure[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
     shift = feet.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
     drop = (source[:, hips, 2] - local[:, hips, 2])[pure]
     return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
@@ -161,9 +163,9 @@ def seams_and_loops(view: View) -> dict:
     """Seams, the rest of the frames, warp and loops."""
     out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
     if view.reference is not None:
-        values = jerk.jerk(view.played.positions, view.fps)
-        at_seams = jerk.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
-        rest = jerk.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        values = movement.jerk(view.played.positions, view.fps)
+        at_seams = movement.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        rest = movement.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
             **_spread(at_seams, ("median", "p95", "max")),
             "share_above_real": _mean(at_seams > 1.0),
@@ -172,12 +174,12 @@ def seams_and_loops(view: View) -> dict:
             "rest_share_above_real": _mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
-    rates = pieces.warp_rates(*view.source)
+    rates = warp_rates(*view.source)
     return {
         **out,
         "seams": len(view.seams) if known else None,
         "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
-        "loop_share": _mean(pieces.replayed(*view.source, view.fps)) if known else None,
+        "loop_share": _mean(find_replayed(*view.source, view.fps)) if known else None,
     }
 
 
@@ -252,8 +254,8 @@ def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> 
     )
     if view.reference is None:
         return [*lines]
-    hard = jerk.jerk(view.played.positions, view.fps)
-    ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
+    hard = movement.jerk(view.played.positions, view.fps)
+    ratios = movement.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
     told = jolts(view.played.times, view.seams, ratios)
     return [*lines, told] if told else [*lines]
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..annotation.ball_contact import surfaces
 from ..annotation.striking import faster_middle, nearest_on
-from ..synthesis.quality import feet, jerk, root
+from ..synthesis.quality import feet, movement
 from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
 from .view import View
 
@@ -82,19 +82,19 @@ def per_frame(view: View) -> PerFrame:
     slides[1:] = feet.contact_speeds(played.feet, played.contacts, view.fps)
     corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
     hard = unknown.copy()
-    if view.reference is not None and count > jerk.SEAM_TO_JERK + 1:
-        values = jerk.jerk(played.positions, view.fps)
-        hard[jerk.SEAM_TO_JERK :][: len(values)] = jerk.ratios(values, view.speed, view.reference.jerk_p95)
+    if view.reference is not None and count > movement.SEAM_TO_JERK + 1:
+        values = movement.jerk(played.positions, view.fps)
+        hard[movement.SEAM_TO_JERK :][: len(values)] = movement.jerk_ratios(values, view.speed, view.reference.jerk_p95)
     return PerFrame(
         times=played.times,
         track=wanted,
-        root_error=root.root_error(played.pelvis, wanted, view.fps) if known else unknown,
-        pelvis_error=root.pelvis_error(played.pelvis, wanted) if known else unknown,
+        root_error=movement.root_error(played.pelvis, wanted, view.fps) if known else unknown,
+        pelvis_error=movement.pelvis_error(played.pelvis, wanted) if known else unknown,
         slide=slides,
         correction=corrected,
         jerk=hard,
         speed=view.speed,
-        asked_speed=root.travel_speed(wanted, view.fps) if known else unknown,
+        asked_speed=movement.travel_speed(wanted, view.fps) if known else unknown,
     )
 
 

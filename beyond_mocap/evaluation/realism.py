@@ -13,7 +13,7 @@ from ..library.features import feature_joints, raw_features
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions
 from ..motion.skeleton import Skeleton
-from ..synthesis.quality.root import nearest_known, speed_class
+from ..synthesis.quality.movement import nearest_known, speed_class
 
 VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
 _ROWS_AT_ONCE = 512  # of distances, which bounds the memory

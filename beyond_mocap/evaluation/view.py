@@ -11,9 +11,9 @@ from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.skeleton import Skeleton
 from ..motion.track import Track
-from ..synthesis.quality import pieces, root
+from ..synthesis.quality import movement
 from ..synthesis.quality.moments import moments
-from ..synthesis.quality.played import Played
+from ..synthesis.quality.played import Played, find_transitions
 from .reference import library_reference
 
 
@@ -29,14 +29,14 @@ class View:
         self.stride = played.stride(library)
         self.rows = self._rows()
         self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
-        self.seams = pieces.seams(*self.source)
-        self.speed = root.travel_speed(played.pelvis, self.fps)
-        self.wanted = None if track is None else root.track_at(track, played.times)
+        self.seams = find_transitions(*self.source)
+        self.speed = movement.travel_speed(played.pelvis, self.fps)
+        self.wanted = None if track is None else movement.track_at(track, played.times)
         self.moments = [] if timeline is None else moments(played, timeline.keys, self.stride, library)
 
     @property
     def source(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Clip, mirrored, clip_frame and stride per frame, as `pieces` wants them."""
+        """Clip, mirrored, clip_frame and stride per frame, as `find_transitions` takes them."""
         return self.played.clip, self.played.mirrored, self.played.clip_frame, self.stride
 
     def own(self, name: str) -> np.ndarray:

@@ -19,8 +19,8 @@ from ..library.features import FPS
 from ..library.library import Library
 from ..library.made import MADE_FOLDER
 from ..motion.track.ball_path import BallPath
-from ..synthesis.construct.meeting import eased
 from ..synthesis.construct.hand_over import handed_over
+from ..synthesis.construct.meeting import eased
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList, at_times

@@ -31,11 +31,11 @@ from ..motion.motion import Motion
 from ..motion.track import BALL_RADIUS, SampledTrack, Track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import travel_direction
-from ..synthesis.construct.strike import Touch
-from ..synthesis.construct.strike_at import Meeting, Met, met_at
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.gaze import CHEST, following
 from ..synthesis.construct.on_track import STANDS, follow_turning
+from ..synthesis.construct.strike import Touch
+from ..synthesis.construct.strike_at import Meeting, Met, met_at
 from ..synthesis.frame_sources import provenance_fields
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan

@@ -14,7 +14,7 @@ from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
-from ..synthesis.quality import feet, jerk, root
+from ..synthesis.quality import feet, movement
 
 MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
@@ -33,7 +33,7 @@ def figures(source, ridden, path, ground=None) -> dict:
     fps = ridden.motion.fps
     out = {
         "length_m": float(np.ptp(ridden.arc)) if len(ridden.arc) else 0.0,
-        "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
+        "root_error_m": _spread(movement.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
         "root_error_own_m": _spread(_own_error(source, own)),
         "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
         "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
@@ -54,7 +54,7 @@ def _pelvis(motion: Motion, humanoid: bool) -> np.ndarray:
 def _own_error(source, own: np.ndarray) -> np.ndarray:
     """Distance (T,) m of the recording's root from its own path."""
     times = np.arange(len(own)) / source.motion.fps
-    return root.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
+    return movement.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
 
 
 def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndarray:
@@ -65,9 +65,9 @@ def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndar
     """
     low, high = path.domain
     line = path.at(np.linspace(low, high, 4001))[:, :2]
-    way = np.concatenate([zero_phase_hann(origin, fps, root.ROOT_WINDOW), line])
+    way = np.concatenate([zero_phase_hann(origin, fps, movement.ROOT_WINDOW), line])
     known = _filled(way[: len(origin)])
-    return cKDTree(known).query(zero_phase_hann(pelvis, fps, root.ROOT_WINDOW))[0]
+    return cKDTree(known).query(zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW))[0]
 
 
 def _filled(line: np.ndarray) -> np.ndarray:
@@ -94,7 +94,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
         free &= np.abs(there - seam) > 0.75 * fps
     path = np.abs(step[free] / asked[free] - 1.0)
     speeds = [
-        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, root.ROOT_WINDOW), rate), axis=1)
+        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, movement.ROOT_WINDOW), rate), axis=1)
         for p, rate in ((pelvis, fps), (own, source.motion.fps))
     ]
     mine, his = speeds[0][:-1][free], speeds[1][frames][:-1][free]
@@ -106,13 +106,13 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
 def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
     """Jerk at the seams of a ride that cycles, against what the recording itself has at that speed."""
     seams = np.asarray(ridden.seams, int)
-    mine, his = (jerk.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
-    speed = root.travel_speed(own[:, :2], source.motion.fps)
-    windows, at = jerk.uncut_windows(his, speed)
+    mine, his = (movement.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
+    speed = movement.travel_speed(own[:, :2], source.motion.fps)
+    windows, at = movement.uncut_windows(his, speed)
     if not len(windows) or not len(seams):
         return {"seams": len(seams), "max": None, "median": None}
-    real = jerk.real_p95(windows, at)
-    ratios = jerk.seam_ratios(mine, seams, root.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
+    real = movement.real_p95(windows, at)
+    ratios = movement.seam_ratios(mine, seams, movement.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
     return {"seams": len(seams), "max": float(ratios.max()), "median": float(np.median(ratios))}
 
 
@@ -220,7 +220,7 @@ def knee_jerk(source, ridden, frames: np.ndarray) -> dict:
     """The knees' third difference, its 99th percentile and largest, over the recording's own in the frames it used."""
     body = identify(source.motion.skeleton)
     knees = [body.left.lower_leg, body.right.lower_leg]
-    mine, his = (jerk.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))
+    mine, his = (movement.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))
     used = np.unique(frames)
     his = his[used[used < len(his)]]
     if not len(mine) or not len(his):

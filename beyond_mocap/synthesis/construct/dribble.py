@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...motion.skeleton import Skeleton
-from .dribble_search import SOONEST, Between, Push, Search
-from .legs import Legs
+from .dribble_search import SOONEST, Between, Legs, Push, Search
 from .meeting import lead
 
 KEY_SECONDS = 0.5

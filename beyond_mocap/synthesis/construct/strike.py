@@ -21,8 +21,20 @@ from ...motion.humanoid import Limb, heading_from_positions, identify
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
 from ...motion.track import BALL_RADIUS
-from .above_ground import above_ground
-from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
+from .carry import (
+    MOST_ANGLE,
+    MOST_SWING,
+    Body,
+    Resting,
+    Swing,
+    above_ground,
+    arm,
+    leg,
+    limb_carried,
+    spine_bent,
+    swing_to,
+    swung,
+)
 from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0

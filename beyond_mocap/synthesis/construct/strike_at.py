@@ -16,8 +16,7 @@ import numpy as np
 from ...annotation.striking import Surface, ball_gap, nearest_on
 from ...motion.humanoid import identify
 from ...motion.motion import Motion
-from .above_ground import above_ground
-from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
+from .carry import MOST_SWING, Body, Resting, above_ground, arm, leg, limb_carried, spine_bent, swing_to, swung
 from .meeting import eased
 
 LONGEST, SHORTEST = 0.5, 0.12

@@ -19,10 +19,9 @@ from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ...motion.track import Track
-from . import feet, jerk, root
+from . import feet, movement
 from .moments import Moment, met, moments
-from .pieces import played_rate, seams
-from .played import Played
+from .played import Played, find_transitions, played_rate
 from .targets import KEY_TARGETS, TARGETS
 
 REACH = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
@@ -53,7 +52,7 @@ def give_way(
     """
     stride = played.stride(library)
     source = played.clip, played.mirrored, played.clip_frame, stride
-    starts = seams(*source)
+    starts = find_transitions(*source)
     keys = moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         *_made_lines(played),
@@ -73,14 +72,14 @@ def give_way(
 
 def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedLine | None:
     """Seams that are harder than recordings are: times (T,) s, starts (S,) frames of seams, ratios (S,) of
-    `jerk.seam_ratios`; None where there is none."""
+    `movement.seam_ratios`; None where there is none."""
     most = TARGETS["seam_jerk_ratio.max"].most
     hard = ratios > most
     if not np.any(hard):
         return None
     flags = np.zeros(len(times), bool)
     for start in starts[hard]:
-        flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
+        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
     hardest = ratios[hard].max()
     return _line(
         times, flags, f"cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)"
@@ -161,7 +160,7 @@ def _too_fast(played: Played, track: Track | None, library: Library | None) -> T
     """Recordings stretched to a speed that they have not, even within the limit of the warp."""
     if track is None or library is None:
         return None
-    speed = root.travel_speed(root.track_at(track, played.times), played.motion.fps)
+    speed = movement.travel_speed(movement.track_at(track, played.times), played.motion.fps)
     fast = (speed > library.fastest * REACH[1]) & ~_made(played)
     if not np.any(fast):
         return None
@@ -210,7 +209,7 @@ def _short_legs(played: Played, ik_miss: np.ndarray | None) -> TimedLine | None:
 def _off_track(played: Played, track: Track | None) -> TimedLine | None:
     if track is None:
         return None
-    error = root.root_error(played.pelvis, root.track_at(track, played.times), played.motion.fps)
+    error = movement.root_error(played.pelvis, movement.track_at(track, played.times), played.motion.fps)
     if not np.any(error > OFF_TRACK):
         return None
     return _line(played.times, error > OFF_TRACK, f"the body is off the track, by up to {error.max():.2f} m")

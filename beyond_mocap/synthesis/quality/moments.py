@@ -14,8 +14,7 @@ from ...library.library import Library
 from ...library.made import MADE_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
-from . import pieces
-from .played import Played
+from .played import Played, find_transitions, number_pieces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +41,8 @@ class Moment:
 
 def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
     """Every asked key moment as it was played; stride (T,): source frames per output frame at recorded speed."""
-    starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
-    number = pieces.runs(len(played.clip), starts)
+    starts = find_transitions(played.clip, played.mirrored, played.clip_frame, stride)
+    number = number_pieces(len(played.clip), starts)
     told = {result.asked: result for result in played.keys}
     library = with_made(library, played)
     return [_moment(played, key, number, told.get(key), library) for key in keys]

@@ -6,7 +6,14 @@ import pytest
 
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.synthesis.construct.carry import (
-    LEAST_ANGLE, MOST_ANGLE, Body, Resting, leg, limb_carried, swing_to, swung,
+    LEAST_ANGLE,
+    MOST_ANGLE,
+    Body,
+    Resting,
+    leg,
+    limb_carried,
+    swing_to,
+    swung,
 )
 from beyond_mocap.synthetic.gait import gait
 

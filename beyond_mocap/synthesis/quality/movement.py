@@ -8,6 +8,7 @@ keep; the track goes through the same window.
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from ...base.time_series import interpolate, time_derivative
 from ...base.vectors import unit_vectors
@@ -17,6 +18,10 @@ ROOT_WINDOW = 1.5  # s
 TRAVEL_WINDOW = 1.0  # s
 STANDING = 0.5  # m/s: slower counts as standing
 SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
+
+JERK_REACH = 8
+_WIDTH = 2 * JERK_REACH + 1
+SEAM_TO_JERK = 2
 
 
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:
@@ -95,3 +100,67 @@ def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.
     above = np.mean(wanted > fastest * reach[1]) if np.isfinite(fastest) else np.nan
     below = np.mean((wanted < slowest * reach[0]) & (wanted > STANDING)) if np.isfinite(slowest) else np.nan
     return {"above": float(above), "below": float(below)}
+
+
+def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
+    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for fewer than four
+    frames."""
+    if len(positions) < 4:
+        return np.zeros(0)
+    third = positions[3:] - positions[:-3] + 3.0 * (positions[1:-2] - positions[2:-1])
+    return np.sqrt(np.max(np.sum(third**2, axis=-1), axis=-1)) * fps**3
+
+
+def windowed(values: np.ndarray) -> np.ndarray:
+    """Largest value within +-8 indices: (N,) -> (N,); windows end with the values."""
+    return maximum_filter1d(values, _WIDTH, mode="nearest") if len(values) else values
+
+
+def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Windowed maxima of an uncut clip where the whole window lies inside it, and the speed in their middle.
+
+    values (T-3,) m/s^3 of `jerk`, speed (T,) m/s -> (M,), (M,) with M = T - 19, or none in a short clip.
+    """
+    if len(values) < _WIDTH:
+        return np.zeros(0), np.zeros(0)
+    whole = slice(JERK_REACH, len(values) - JERK_REACH)
+    return windowed(values)[whole], speed[SEAM_TO_JERK:][whole]
+
+
+def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndarray:
+    """95th percentile (5,) m/s^3 of uncut windows (M,) in each speed class of speed (M,) m/s.
+
+    A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare); NaN
+    where none has.
+    """
+    classes = speed_class(speed)
+    values = [windows[classes == k] for k in range(5)]
+    return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
+
+
+def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Windowed jerk at each seam over the real p95 at that speed: (S,).
+
+    values (T-3,) m/s^3; seams (S,) frames; speed (T,) m/s; real (5,) m/s^3 of `real_p95`.
+    """
+    if not len(values) or not len(seams):
+        return np.zeros(0)
+    middle = np.clip(seams - SEAM_TO_JERK, 0, len(values) - 1)
+    return windowed(values)[middle] / real[speed_class(speed[seams])]
+
+
+def jerk_ratios(values: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """Windowed jerk over the real p95 at that speed, in the middle of every window: (T-3,); see `seam_ratios`."""
+    pace = speed[SEAM_TO_JERK : SEAM_TO_JERK + len(values)]
+    return windowed(values) / real[speed_class(pace)]
+
+
+def rest_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
+    """The same ratio in the middle of every window that touches no seam's window: (M,). A locked knee can pop
+    anywhere."""
+    if not len(values):
+        return np.zeros(0)
+    free = np.ones(len(values), dtype=bool)
+    for seam in seams - SEAM_TO_JERK:
+        free[max(seam - 2 * JERK_REACH, 0) : seam + 2 * JERK_REACH + 1] = False
+    return jerk_ratios(values, speed, real)[free]
