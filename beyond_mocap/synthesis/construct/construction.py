@@ -159,7 +159,7 @@ class Construction:
 
 
 def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
-    """Turn poses (T, J, 4), local rotations with the root's in the facing frame, to face heading (T,) rad: (T, J, 4)."""
+    """Turn poses (T, J, 4) local, the root's in the facing frame, so that the body faces heading (T,) rad."""
     out = pose.copy()
     out[:, 0] = quaternion.multiply(quaternion.about_up(heading), pose[:, 0])
     return out

@@ -2,10 +2,10 @@
 their jump spread over the frames around it (Faustino §3.3.1 eq. 25, 26, after Arikan and Forsyth 2002).
 
 In a fade both are real, so that places, velocities and accelerations agree at both ends of it. Compared on 33 takes of
-20 s from three libraries, jerk at transitions over the real 95th percentile (median; share of transitions above):
-the jump spread by eq. 25 0.90; 33 %, inertialization (the jump and its velocity decaying by a quintic, half on each side;
-Bollo 2018) 0.84; 31 %, all of it after the transition 0.84; 30 % with feet moved half as far again, and this fade 0.73;
-25 %.
+20 s from three libraries, jerk at transitions over the real 95th percentile (median; share of transitions above
+it): the jump spread by eq. 25 0.90; 33 %, inertialization (the jump and its velocity decaying by a quintic, half on
+each side; Bollo 2018) 0.84; 31 %, all of it after the transition 0.84; 30 % with feet moved half as far again, and this
+fade 0.73; 25 %.
 """
 
 from __future__ import annotations

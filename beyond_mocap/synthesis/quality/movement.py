@@ -1,8 +1,10 @@
-"""How well the body is where the track says: root and pelvis error, the body's own sway, surge, speeds and coverage.
+"""How a body moves: how well it is where the track says, its sway, surge and speeds, and how hard its transitions are.
 
-Everything here is on the ground plane: pelvis (T, 2) and track (T, 2) in metres on the pitch, one row per output frame.
-The *root* of `../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must
-keep; the track goes through the same window.
+Pelvis (T, 2) and track (T, 2) are in metres on the pitch, one row per output frame. The *root* of
+`../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must keep; the track
+goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed show. Its index t stands
+for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the new piece) has its middle
+at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
 """
 
 from __future__ import annotations
@@ -18,10 +20,8 @@ ROOT_WINDOW = 1.5  # s
 TRAVEL_WINDOW = 1.0  # s
 STANDING = 0.5  # m/s: slower counts as standing
 SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
-
-JERK_REACH = 8
+JERK_REACH, SEAM_TO_JERK = 8, 2
 _WIDTH = 2 * JERK_REACH + 1
-SEAM_TO_JERK = 2
 
 
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:
@@ -70,8 +70,7 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     surging pelvis.
     """
     speed = time_derivative(pelvis, fps)
-    course = zero_phase_hann(speed, fps, ROOT_WINDOW)
-    course = unit_vectors(course)
+    course = unit_vectors(zero_phase_hann(speed, fps, ROOT_WINDOW))
     along = np.sum(speed * course, axis=-1, keepdims=True)
     return (along - zero_phase_hann(along, fps, ROOT_WINDOW))[:, 0]
 
@@ -103,8 +102,7 @@ def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.
 
 
 def jerk(positions: np.ndarray, fps: float) -> np.ndarray:
-    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for fewer than four
-    frames."""
+    """Largest third difference of any joint: positions (T, J, 3) m -> (T-3,) m/s^3, empty for less than four frames."""
     if len(positions) < 4:
         return np.zeros(0)
     third = positions[3:] - positions[:-3] + 3.0 * (positions[1:-2] - positions[2:-1])

@@ -1,4 +1,9 @@
-"""What was played: a body's motion, the ball, and where every frame came from; the same from memory and from files."""
+"""What was played: a body's motion, the ball, where every frame came from, and the pieces of clips that it is made of;
+the same from memory and from files.
+
+Pieces are read off clip (T,) an integer per clip (negative where unknown), mirrored (T,) bool, clip_frame (T,)
+fractional in the clip's own rate, and `stride` (T,), the source frames that pass in one output frame at recorded speed.
+"""
 
 from __future__ import annotations
 
@@ -91,26 +96,13 @@ class Played:
         return rates[self.clip]
 
 
-def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
-    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
-    forward = steps[steps > 0]
-    return float(np.median(forward)) if len(forward) else 1.0
-
-
 def played_from_take(take: Take) -> Played:
     """What a take in memory plays."""
     return Played(
-        motion=take.motion,
-        start_time=take.start_time,
-        clips=tuple(take.clips),
-        clip=np.asarray(take.clip, dtype=int),
-        clip_frame=np.asarray(take.clip_frame, dtype=float),
-        mirrored=np.asarray(take.mirrored, dtype=bool),
-        words=tuple(take.words),
-        contacts=np.asarray(take.contacts, dtype=bool),
-        ball=take.ball,
-        correction=take.correction,
-        keys=tuple(take.keys),
+        motion=take.motion, start_time=take.start_time, clips=tuple(take.clips), clip=np.asarray(take.clip, dtype=int),
+        clip_frame=np.asarray(take.clip_frame, dtype=float), mirrored=np.asarray(take.mirrored, dtype=bool),
+        words=tuple(take.words), contacts=np.asarray(take.contacts, dtype=bool), ball=take.ball,
+        correction=take.correction, keys=tuple(take.keys),
     )
 
 
@@ -120,10 +112,9 @@ def played_from_tables(
     """What a motion read from a file plays, with its provenance and ball where they are known.
 
     provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
-    clip_frame (T,),
-    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and
-    contacts are detected on the motion itself. where: the table's file, for messages. InputError where it has another
-    length.
+    clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at
+    `start_time` and contacts are detected on the motion itself. where: the table's file, for messages. InputError where
+    it has another length.
     """
     count = len(motion)
     if provenance is None:
@@ -134,23 +125,11 @@ def played_from_tables(
         raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
     clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
     return Played(
-        motion=motion,
-        start_time=float(provenance.times[0]),
-        clips=tuple(str(clip) for clip in clips),
-        clip=index.reshape(-1),
-        clip_frame=np.asarray(provenance.clip_frame, dtype=float),
-        mirrored=np.asarray(provenance.mirrored, dtype=bool),
-        words=tuple(map(tuple, provenance.words)),
-        contacts=np.asarray(provenance.contacts, dtype=bool),
-        ball=ball,
+        motion=motion, start_time=float(provenance.times[0]), clips=tuple(str(clip) for clip in clips),
+        clip=index.reshape(-1), clip_frame=np.asarray(provenance.clip_frame, dtype=float),
+        mirrored=np.asarray(provenance.mirrored, dtype=bool), words=tuple(map(tuple, provenance.words)),
+        contacts=np.asarray(provenance.contacts, dtype=bool), ball=ball,
     )
-
-
-def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
-    """Played / recorded speed from each frame to the next: (T-1,), NaN where the clip changes or is not known."""
-    rate = np.diff(clip_frame) / stride[:-1]
-    same = (clip[1:] == clip[:-1]) & (mirrored[1:] == mirrored[:-1]) & (clip[1:] >= 0)
-    return np.where(same, rate, np.nan)
 
 
 def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
@@ -166,18 +145,25 @@ def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndar
     return np.flatnonzero(known & (np.isnan(rate) | jump)) + 1
 
 
-def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
-    """Played / recorded speed of every step inside a run: (N,)."""
-    rate = played_rate(clip, mirrored, clip_frame, stride)
-    rate[find_transitions(clip, mirrored, clip_frame, stride) - 1] = np.nan
-    return rate[np.isfinite(rate)]
-
-
 def number_pieces(count: int, starts: np.ndarray) -> np.ndarray:
     """Number of the run that each of `count` frames belongs to: (T,) int, one more at every seam in `starts`."""
     flags = np.zeros(count, dtype=int)
     flags[starts] = 1
     return np.cumsum(flags)
+
+
+def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+    """Played / recorded speed from each frame to the next: (T-1,), NaN where the clip changes or is not known."""
+    rate = np.diff(clip_frame) / stride[:-1]
+    same = (clip[1:] == clip[:-1]) & (mirrored[1:] == mirrored[:-1]) & (clip[1:] >= 0)
+    return np.where(same, rate, np.nan)
+
+
+def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+    """Played / recorded speed of every step inside a run: (N,)."""
+    rate = played_rate(clip, mirrored, clip_frame, stride)
+    rate[find_transitions(clip, mirrored, clip_frame, stride) - 1] = np.nan
+    return rate[np.isfinite(rate)]
 
 
 def find_replayed(
@@ -190,8 +176,7 @@ def find_replayed(
     ahead, and does not count.
     """
     number = number_pieces(len(clip), find_transitions(clip, mirrored, clip_frame, stride))
-    first = np.full(number[-1] + 1, np.inf)
-    last = np.full(number[-1] + 1, -np.inf)
+    first, last = np.full(number[-1] + 1, np.inf), np.full(number[-1] + 1, -np.inf)
     np.fmin.at(first, number, clip_frame)
     np.fmax.at(last, number, clip_frame)
     out = np.zeros(len(clip), dtype=bool)
@@ -203,6 +188,12 @@ def find_replayed(
     return out
 
 
+def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if len(forward) else 1.0
+
+
 def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
     """Median of the finite rates up to `reach` steps away on either side, the step itself left out; 1 where there are
     none."""
@@ -212,6 +203,5 @@ def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
     around.sort(axis=0)
     count = np.sum(np.isfinite(around), axis=0)
     column = np.arange(len(rate))
-    low, high = np.maximum(count - 1, 0) // 2, count // 2
-    high = np.minimum(high, np.maximum(count - 1, 0))
+    low, high = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, np.maximum(count - 1, 0))
     return np.where(count > 0, 0.5 * (around[low, column] + around[high, column]), 1.0)
