@@ -2,9 +2,9 @@
 
 Pelvis (T, 2) and track (T, 2) are in metres on the pitch, one row per output frame. The *root* of
 `../shared/metrics.md` is the pelvis behind a 1.5 s window, which takes out the sway that a body must keep; the track
-goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed show. Its index t stands
-for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the new piece) has its middle
-at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
+goes through the same window. Jerk, the third difference, is compared with what uncut recordings of the same speed show.
+Its index t stands for frames t .. t+3, so its middle is frame t + 1.5. A transition at frame s (the first of the new
+piece) has its middle at s - 0.5; its window of +-8 frames is jerk indices s-10 .. s+6.
 """
 
 from __future__ import annotations
