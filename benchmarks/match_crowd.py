@@ -22,8 +22,7 @@ from beyond_mocap.match.make import make_match
 from beyond_mocap.match.order import MatchOrder
 from beyond_mocap.match.take_npz import read_player
 from beyond_mocap.motion.motion import Motion, forward_kinematics
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
-from beyond_mocap.synthesis.quality.movement import jerk
+from beyond_mocap.synthesis.quality.movement import contact_speeds, foot_joints, jerk
 from beyond_mocap.synthesis.take import Take
 
 SECONDS = (1480.0, 1500.0)

@@ -13,7 +13,7 @@ from ..library.automatic import automatic_words
 from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
-from ..synthesis.quality import feet, movement
+from ..synthesis.quality import movement
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
 from ..synthesis.quality.played import find_replayed, warp_rates
@@ -93,27 +93,28 @@ def skate_and_ground(view: View) -> dict:
     """Skate in all its forms and the ground."""
     played, fps = view.played, view.fps
     planted = played.feet
-    travel = feet.stance_travel(planted[:, :, 1], feet.stances(played.contacts))
+    travel = movement.stance_travel(planted[:, :, 1], movement.stances(played.contacts))
     own = np.zeros(0) if view.reference is None else view.reference.used_stances(view.used)
-    skating = feet.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
-    heel_rest = feet.heel_rest_height(planted, played.contacts) if view.reference is None else view.reference.heel_rest
-    support = feet.support_height(planted, played.contacts, heel_rest)
+    skating = movement.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
+    known = view.reference is not None
+    heel_rest = view.reference.heel_rest if known else movement.heel_rest_height(planted, played.contacts)
+    support = movement.support_height(planted, played.contacts, heel_rest)
     return {
         "skate": {
-            "contact_cm_s": 100.0 * _mean(feet.contact_speeds(planted, played.contacts, fps)),
+            "contact_cm_s": 100.0 * _mean(movement.contact_speeds(planted, played.contacts, fps)),
             "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
             "stance_mm_median": 1000.0 * _median(travel),
-            "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
+            "stances_over_21mm": _mean(travel > movement.NOTICED_SLIDE),
             "gmd_ratio": _mean(skating),
             "source_gmd_ratio": _mean(view.own("skating")),
             "source_stance_mm_median": 1000.0 * _median(own),
-            "source_stances_over_21mm": _mean(own > feet.NOTICED_SLIDE),
+            "source_stances_over_21mm": _mean(own > movement.NOTICED_SLIDE),
         },
         "ground_mm": {
             "min": 1000.0 * float(played.positions[..., 2].min()),
             "support_max": 1000.0 * _max(support),
             "source_support_max": 1000.0 * _max(view.own("support")),
-            "tip_min": -1000.0 * _max(-feet.tip_height(played.motion.skeleton, played.positions, played.rotations)),
+            "tip_min": -1000.0 * _max(-movement.tip_height(played.motion.skeleton, played.positions, played.rotations)),
             "source_tip_min": -1000.0 * _max(-view.own("tip")),
         },
     }
@@ -141,13 +142,13 @@ def _against_source(view: View) -> tuple[np.ndarray, float]:
     if view.library is None or not len(view.used):
         return np.zeros(0), math.nan
     played, hips = view.played, view.played.body.hips
-    joints = feet.foot_joints(played.motion.skeleton)
+    joints = movement.foot_joints(played.motion.skeleton)
     local = realism.local_positions(played.motion.skeleton, played.positions, hips)
     source = source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
     pure = np.isfinite(source[:, 0, 0])
     for seam in view.seams:
         pure[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
-    shift = feet.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
+    shift = movement.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
     drop = (source[:, hips, 2] - local[:, hips, 2])[pure]
     return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
 

@@ -16,7 +16,7 @@ from ..annotation import Timeline
 from ..library.library import Library
 from ..motion.track import Track
 from ..synthesis.quality import movement
-from ..synthesis.quality.feet import contact_speeds
+from ..synthesis.quality.movement import contact_speeds
 from ..synthesis.quality.played import Played
 from . import plots
 from .html_page import (

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..annotation.ball_contact import surfaces
 from ..annotation.striking import faster_middle, nearest_on
-from ..synthesis.quality import feet, movement
+from ..synthesis.quality import movement
 from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
 from .view import View
 
@@ -48,7 +48,7 @@ class PerFrame:
 class Footprint:
     """One stance. side: 0 left, 1 right. start, end: its first and last second. heel, toe: mean places (2,) m of the
     foot's joints on the ground; where they are the same the foot has no toe joint. direction: radians of the foot, from
-    +x. slide: metres that its toe travelled (`feet.stance_travel`)."""
+    +x. slide: metres that its toe travelled (`movement.stance_travel`)."""
 
     side: int
     start: float
@@ -79,7 +79,7 @@ def per_frame(view: View) -> PerFrame:
     wanted = np.full((count, 2), np.nan) if view.wanted is None else view.wanted
     known = view.wanted is not None
     slides = np.full((count, 2), np.nan)
-    slides[1:] = feet.contact_speeds(played.feet, played.contacts, view.fps)
+    slides[1:] = movement.contact_speeds(played.feet, played.contacts, view.fps)
     corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
     hard = unknown.copy()
     if view.reference is not None and count > movement.SEAM_TO_JERK + 1:
@@ -101,8 +101,8 @@ def per_frame(view: View) -> PerFrame:
 def footprints(view: View) -> tuple[Footprint, ...]:
     """Every stance, in the order of time."""
     played = view.played
-    spans = feet.stances(played.contacts)
-    travel = feet.stance_travel(played.feet[:, :, 1], spans)
+    spans = movement.stances(played.contacts)
+    travel = movement.stance_travel(played.feet[:, :, 1], spans)
     found = [_footprint(view, span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
     return tuple(sorted(found, key=lambda print_: (print_.start, print_.side)))
 

@@ -21,7 +21,7 @@ from ..library.clip import Clip
 from ..library.library import Library
 from ..motion.humanoid import Humanoid, identify
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
-from ..synthesis.quality import feet, movement
+from ..synthesis.quality import movement
 from . import realism
 
 POSES_PER_SECOND = 10.0
@@ -170,11 +170,11 @@ def measure(clip: Clip, fps: float) -> Recording:
     motion = resample(clip.recording, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
-    pelvis, planted = positions[:, hips, :2], positions[:, feet.foot_joints(skeleton)]
+    pelvis, planted = positions[:, hips, :2], positions[:, movement.foot_joints(skeleton)]
     at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
     contacts = clip.contacts[at]
-    spans = feet.stances(contacts)
-    heel_rest, floor = feet.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
+    spans = movement.stances(contacts)
+    heel_rest, floor = movement.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
     return Recording(
         path=clip.path,
         rate=clip.motion.fps,
@@ -182,15 +182,15 @@ def measure(clip: Clip, fps: float) -> Recording:
         sway=movement.sway(pelvis, fps),
         surge=movement.surge(pelvis, fps),
         speed=movement.travel_speed(pelvis, fps),
-        contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False),
+        contact_speed=np.concatenate([movement.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
+        skating=np.append(movement.skating_steps(planted[:, :, 1], floor, fps), False),
         heel_rest=heel_rest,
-        support=feet.support_height(planted, contacts, heel_rest),
-        tip=feet.tip_height(skeleton, positions, rotations),
+        support=movement.support_height(planted, contacts, heel_rest),
+        tip=movement.tip_height(skeleton, positions, rotations),
         jerk=movement.jerk(positions, fps),
         smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
         stances=spans,
-        travel=feet.stance_travel(planted[:, :, 1], spans),
+        travel=movement.stance_travel(planted[:, :, 1], spans),
     )
 
 

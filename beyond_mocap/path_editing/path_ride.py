@@ -14,7 +14,7 @@ from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
-from ..synthesis.quality import feet, movement
+from ..synthesis.quality import movement
 
 MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
@@ -150,25 +150,25 @@ def carried(ridden) -> np.ndarray:
 
 def _foot_places(motion: Motion) -> np.ndarray:
     """(T, 2, 2, 3) m: side, heel and toe."""
-    return forward_kinematics(motion)[0][:, feet.foot_joints(motion.skeleton)]
+    return forward_kinematics(motion)[0][:, movement.foot_joints(motion.skeleton)]
 
 
 def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: np.ndarray | None = None) -> dict:
     """Mean speed of standing feet (flat: heel and toe stand) and of standing points, cm/s; how far toes travel within a
     stance, mm. used: frames that count, None for all."""
     flat = points.all(axis=2)
-    speeds = feet.contact_speeds(places, flat, fps)
+    speeds = movement.contact_speeds(places, flat, fps)
     point = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) * fps
     point = np.where(points[:-1] & points[1:], point, np.nan)
     if used is not None:
         kept = used[used < len(speeds)]
         speeds, point = speeds[kept], point[kept]
-    travel = feet.stance_travel(places[:, :, 1], feet.stances(flat))
+    travel = movement.stance_travel(places[:, :, 1], movement.stances(flat))
     return {
         f"{name}contact_cm_s": 100.0 * _mean(speeds),
         f"{name}point_cm_s": 100.0 * _mean(point),
         f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
-        f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float)),
+        f"{name}stances_over_21mm": _mean((travel > movement.NOTICED_SLIDE).astype(float)),
     }
 
 
@@ -182,7 +182,7 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
     above = places - surface[..., None] * [0.0, 0.0, 1.0]
     own_floor, toe_rest = foot_contacts.floor_height(recording), foot_contacts.recorded_floor(recording)[1]
     ankle = foot_contacts.sole_height(recording.skeleton)  # of a flat foot without toes
-    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
+    rest = movement.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
     heel_rest = max(rest, ankle) + toe_rest - ankle
     lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - heel_rest)
     standing = lower[flat & np.isfinite(lower)]

@@ -25,9 +25,8 @@ from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
 from ..motion.track.ball_path import BallPath
-from .construct.construction import Construction
+from .construct.construction import Construction, find_touches, key_results
 from .construct.hand_over import OldMotion, handed_over, old_share
-from .construct.key_moments import find_touches, key_results
 from .construct.transitions import spread_reaches
 from .frame_sources import sources_shown, words_shown
 from .own_size import taken_in_library_size

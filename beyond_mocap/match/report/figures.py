@@ -10,7 +10,7 @@ from ...evaluation.report import evaluate, rounded
 from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
-from ...synthesis.quality import feet, movement
+from ...synthesis.quality import movement
 from ...synthesis.quality.played import Played, played_from_take
 from ...synthesis.take import Take
 
@@ -95,7 +95,7 @@ def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):
     """(name, values (T,) or (T, 2), what stands for a second of them)."""
     wanted = movement.track_at(track, played.times)
     skate = np.full((len(played.motion), 2), np.nan)
-    skate[1:] = 100.0 * feet.contact_speeds(played.feet, played.contacts, played.motion.fps)
+    skate[1:] = 100.0 * movement.contact_speeds(played.feet, played.contacts, played.motion.fps)
     place = [np.interp(played.times, ball.times, ball.positions[:, axis], np.nan, np.nan) for axis in (0, 1)]
     away = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
     return (

@@ -18,7 +18,7 @@ from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ...motion.track import Track
-from . import feet, movement
+from . import movement
 from .moments import Moment, met, moments
 from .played import Played, find_transitions, played_rate
 from .targets import KEY_TARGETS, TARGETS
@@ -153,10 +153,10 @@ def _warped(played: Played, source) -> TimedLine | None:
 
 def _sliding(played: Played) -> TimedLine | None:
     """Stances whose toe travels farther than eyes overlook."""
-    stances = feet.stances(played.contacts)
-    travel = feet.stance_travel(played.feet[:, :, 1], stances)
+    stances = movement.stances(played.contacts)
+    travel = movement.stance_travel(played.feet[:, :, 1], stances)
     flags = np.zeros(len(played.motion), bool)
-    for first, end, _ in stances[travel > feet.NOTICED_SLIDE]:
+    for first, end, _ in stances[travel > movement.NOTICED_SLIDE]:
         flags[first:end] = True
     return _line(played.times, flags, f"a standing foot slides, by up to {100 * travel.max(initial=0.0):.0f} cm")
 

@@ -22,7 +22,7 @@ from ...motion.humanoid import Humanoid, identify
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.track.ball_path import BallPath
 from ..take import KeyResult, Take
-from .feet import foot_joints
+from .movement import foot_joints
 
 LOOP_SECONDS = 4.0
 LOOP_REACH = 80.0 / 60.0
