@@ -287,7 +287,7 @@ class _Part:
     def _length(self, chain) -> float:
         """Metres of a limb, stretched."""
         bones = joints_down(self.skeleton, chain[0], chain[-1])[:0:-1]
-        return sum((np.linalg.norm(self.skeleton.offsets[joint]) for joint in bones), 0.0)
+        return float(sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in bones))
 
     def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
         """(W,) m that `joint` is too far from the goal, setting in softly, and (W, 3) the way there."""
