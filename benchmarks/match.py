@@ -28,8 +28,7 @@ from beyond_mocap.match.player_edit import read_player
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.track import clean, sample
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
-from beyond_mocap.synthesis.quality.jerk import jerk
+from beyond_mocap.synthesis.quality.movement import contact_speeds, foot_joints, jerk
 from beyond_mocap.synthesis.resolve_plan import resolve_plan
 from beyond_mocap.synthesis.search.path_costs import balanced
 from beyond_mocap.synthesis.search.path_search import PathSearch

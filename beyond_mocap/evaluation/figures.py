@@ -18,9 +18,10 @@ from ..library.automatic import automatic_words
 from ..library.keys import serving
 from ..motion.contacts import floor_height
 from ..motion.track import sample, zero_phase_hann
-from ..synthesis.quality import feet, jerk, pieces, root
+from ..synthesis.quality import movement
 from ..synthesis.quality.give_way import give_way, jolts
 from ..synthesis.quality.moments import Moment, ball_gap, ball_shift, met, with_made
+from ..synthesis.quality.played import find_replayed, warp_rates
 from . import realism
 from .reference import View, source_poses
 
@@ -33,24 +34,24 @@ def place(view: View) -> dict:
            "pelvis_error_m": {"mean": None, "own": own, "keys": None},
            "speed_coverage": {"above": None, "below": None}}  # fmt: skip
     if view.wanted is not None:
-        error, unsmoothed = root.root_error(pelvis, view.wanted, fps), root.pelvis_error(pelvis, view.wanted)
+        error, unsmoothed = movement.root_error(pelvis, view.wanted, fps), movement.pelvis_error(pelvis, view.wanted)
         out["root_error_m"] = _spread(error, ("mean", "p95", "max"))
         at_keys = [float(np.interp(m.asked.in_force, view.played.times, unsmoothed)) for m in view.moments]
         out["pelvis_error_m"] = {"mean": _mean(unsmoothed), "own": own, "keys": _mean(np.array(at_keys))}
     if view.wanted is not None and view.reference is not None:
-        asked = root.travel_speed(view.wanted, fps)
-        out["speed_coverage"] = root.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
+        asked = movement.travel_speed(view.wanted, fps)
+        out["speed_coverage"] = movement.speed_coverage(asked, view.reference.fastest, view.reference.slowest)
     return {**out, **_surge(view)}
 
 
 def _surge(view: View) -> dict:
     """Surge against the rms of the used recordings at the same speed; `track` is what the track itself asks for, behind
     the window behind which the root is held to it."""
-    ours = root.surge(view.played.pelvis, view.fps)
-    own = root.class_rms(view.own("surge"), root.speed_class(view.own("speed")))[root.speed_class(view.speed)]
-    rms, real = _rms(ours), _rms(own)
-    smooth = None if view.wanted is None else zero_phase_hann(view.wanted, view.fps, root.ROOT_WINDOW)
-    asked = None if smooth is None else _rms(root.surge(smooth, view.fps))
+    ours = movement.surge(view.played.pelvis, view.fps)
+    own = movement.class_rms(view.own("surge"), movement.speed_class(view.own("speed")))
+    rms, real = _rms(ours), _rms(own[movement.speed_class(view.speed)])
+    smooth = None if view.wanted is None else zero_phase_hann(view.wanted, view.fps, movement.ROOT_WINDOW)
+    asked = None if smooth is None else _rms(movement.surge(smooth, view.fps))
     surge = {"mean": rms, "own": real, "track": asked}
     return {"pelvis_surge_ratio": rms / real if real else math.nan, "pelvis_surge_m_s": surge}
 
@@ -65,10 +66,11 @@ def _key(view: View, moment: Moment) -> dict:
     place: dict[str, float | None] = {"position_error_m": None, "pelvis_error_m": None, "ball_shift_m": None}
     met_at, met_gap = met(played, moment)
     if view.wanted is not None:
-        error = root.root_error(played.pelvis, view.wanted, view.fps)
+        error = movement.root_error(played.pelvis, view.wanted, view.fps)
         frame = int(round((met_at - played.start_time) * view.fps)) if np.isfinite(met_at) else moment.frame
         place["position_error_m"] = float(np.interp(time, played.times, error))
-        place["pelvis_error_m"] = float(np.interp(time, played.times, root.pelvis_error(played.pelvis, view.wanted)))
+        unsmoothed = movement.pelvis_error(played.pelvis, view.wanted)
+        place["pelvis_error_m"] = float(np.interp(time, played.times, unsmoothed))
         place["ball_shift_m"] = ball_shift(played, frame, view.track)
     return {
         "time_s": moment.asked.time, "solved_time_s": moment.asked.solved, "labels": list(moment.asked.words),
@@ -82,24 +84,25 @@ def skate_and_ground(view: View) -> dict:
     """Skate in all its forms and the ground."""
     played, fps = view.played, view.fps
     planted = played.feet
-    travel = feet.stance_travel(planted[:, :, 1], feet.stances(played.contacts))
+    travel = movement.stance_travel(planted[:, :, 1], movement.stances(played.contacts))
     own = np.zeros(0) if view.reference is None else view.reference.used_stances(view.used)
-    skating = feet.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
-    heel_rest = feet.heel_rest_height(planted, played.contacts) if view.reference is None else view.reference.heel_rest
-    support = feet.support_height(planted, played.contacts, heel_rest)
+    skating = movement.skating_steps(planted[:, :, 1], floor_height(played.motion), fps)
+    known = view.reference is not None
+    heel_rest = view.reference.heel_rest if known else movement.heel_rest_height(planted, played.contacts)
+    support = movement.support_height(planted, played.contacts, heel_rest)
     return {
         "skate": {
-            "contact_cm_s": 100.0 * _mean(feet.contact_speeds(planted, played.contacts, fps)),
+            "contact_cm_s": 100.0 * _mean(movement.contact_speeds(planted, played.contacts, fps)),
             "source_contact_cm_s": 100.0 * _mean(view.own("contact_speed")),
-            "stance_mm_median": 1000.0 * _median(travel), "stances_over_21mm": _mean(travel > feet.NOTICED_SLIDE),
+            "stance_mm_median": 1000.0 * _median(travel), "stances_over_21mm": _mean(travel > movement.NOTICED_SLIDE),
             "gmd_ratio": _mean(skating), "source_gmd_ratio": _mean(view.own("skating")),
             "source_stance_mm_median": 1000.0 * _median(own),
-            "source_stances_over_21mm": _mean(own > feet.NOTICED_SLIDE),
+            "source_stances_over_21mm": _mean(own > movement.NOTICED_SLIDE),
         },
         "ground_mm": {
             "min": 1000.0 * float(played.positions[..., 2].min()), "support_max": 1000.0 * _max(support),
             "source_support_max": 1000.0 * _max(view.own("support")),
-            "tip_min": -1000.0 * _max(-feet.tip_height(played.motion.skeleton, played.positions, played.rotations)),
+            "tip_min": -1000.0 * _max(-movement.tip_height(played.motion.skeleton, played.positions, played.rotations)),
             "source_tip_min": -1000.0 * _max(-view.own("tip")),
         },
     }
@@ -125,13 +128,13 @@ def _against_source(view: View) -> tuple[np.ndarray, float]:
     if view.library is None or not len(view.used):
         return np.zeros(0), math.nan
     played, hips = view.played, view.played.body.hips
-    joints = feet.foot_joints(played.motion.skeleton)
+    joints = movement.foot_joints(played.motion.skeleton)
     local = realism.local_positions(played.motion.skeleton, played.positions, hips)
     source = source_poses(view.library, played.clips, played.clip, played.mirrored, played.clip_frame)
     pure = np.isfinite(source[:, 0, 0])
     for seam in view.seams:
-        pure[max(seam - jerk.REACH, 0) : seam + jerk.REACH] = False
-    shift = feet.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
+        pure[max(seam - movement.JERK_REACH, 0) : seam + movement.JERK_REACH] = False
+    shift = movement.planted_shift(local[:, joints], source[:, joints], played.contacts & pure[:, None])
     drop = (source[:, hips, 2] - local[:, hips, 2])[pure]
     return shift, float(max(drop.max(), 0.0)) if len(drop) else math.nan
 
@@ -147,19 +150,19 @@ def seams_and_loops(view: View) -> dict:
     """Seams, the rest of the frames, warp and loops."""
     out = {"seam_jerk_ratio": dict.fromkeys(("median", "p95", "max", "share_above_real"))}
     if view.reference is not None:
-        values = jerk.jerk(view.played.positions, view.fps)
-        at_seams = jerk.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
-        rest = jerk.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        values = movement.jerk(view.played.positions, view.fps)
+        at_seams = movement.seam_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
+        rest = movement.rest_ratios(values, view.seams, view.speed, view.reference.jerk_p95)
         out["seam_jerk_ratio"] = {
             **_spread(at_seams, ("median", "p95", "max")), "share_above_real": _mean(at_seams > 1.0),
             "source_share_above_real": _mean(view.own("jerk_above_real")), "rest_max": _max(rest),
             "rest_share_above_real": _mean(rest > 1.0),
         }
     known = bool(np.any(view.played.clip >= 0))
-    rates = pieces.warp_rates(*view.source)
+    rates = warp_rates(*view.source)
     return {
         **out, "seams": len(view.seams) if known else None, "warp_rate": {"min": -_max(-rates), "max": _max(rates)},
-        "loop_share": _mean(pieces.replayed(*view.source, view.fps)) if known else None,
+        "loop_share": _mean(find_replayed(*view.source, view.fps)) if known else None,
     }
 
 
@@ -227,8 +230,8 @@ def warnings(view: View, ik_miss: np.ndarray | None, asked: Timeline | None) -> 
                                   ik_miss=ik_miss, asked=asked)]
     if view.reference is None:
         return lines
-    hard = jerk.jerk(view.played.positions, view.fps)
-    ratios = jerk.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
+    hard = movement.jerk(view.played.positions, view.fps)
+    ratios = movement.seam_ratios(hard, view.seams, view.speed, view.reference.jerk_p95)
     told = jolts(view.played.times, view.seams, ratios)
     return [*lines, told] if told else lines
 

@@ -15,8 +15,8 @@ import numpy as np
 from ..annotation import Timeline
 from ..library.library import Library
 from ..motion.track import Track
-from ..synthesis.quality import jerk
-from ..synthesis.quality.feet import contact_speeds
+from ..synthesis.quality import movement
+from ..synthesis.quality.movement import contact_speeds
 from ..synthesis.quality.played import Played
 from . import plots
 from .html_page import (
@@ -137,7 +137,7 @@ def _worst(view: View) -> Html:
 def worst_frames(view: View) -> list[tuple[int, str]]:
     """(output frame, why) of the hardest jolts and of the worst slide of a standing foot, each at least a second
     apart."""
-    jolts = jerk.jerk(view.played.positions, view.fps), 1, "jolt of {:.0f} m/s³"
+    jolts = movement.jerk(view.played.positions, view.fps), 1, "jolt of {:.0f} m/s³"
     speeds = np.nan_to_num(contact_speeds(view.played.feet, view.played.contacts, view.fps))
     slides = speeds.max(axis=1, initial=0.0), 0, "foot slides at {:.2f} m/s"
     found: list[tuple[int, str]] = []

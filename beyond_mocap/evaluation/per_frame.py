@@ -12,7 +12,7 @@ import numpy as np
 
 from ..annotation.ball_contact import surfaces
 from ..annotation.striking import faster_middle, nearest_on
-from ..synthesis.quality import feet, jerk, root
+from ..synthesis.quality import movement
 from ..synthesis.quality.moments import Moment, met, touching_words, written_ball
 from .reference import View
 
@@ -47,7 +47,7 @@ class PerFrame:
 class Footprint:
     """One stance. side: 0 left, 1 right. start, end: its first and last second. heel, toe: mean places (2,) m of the
     foot's joints on the ground; where they are the same the foot has no toe joint. direction: radians of the foot, from
-    +x. slide: metres that its toe travelled (`feet.stance_travel`)."""
+    +x. slide: metres that its toe travelled (`movement.stance_travel`)."""
 
     side: int
     start: float
@@ -78,25 +78,25 @@ def per_frame(view: View) -> PerFrame:
     wanted = np.full((count, 2), np.nan) if view.wanted is None else view.wanted
     known = view.wanted is not None
     slides = np.full((count, 2), np.nan)
-    slides[1:] = feet.contact_speeds(played.feet, played.contacts, view.fps)
+    slides[1:] = movement.contact_speeds(played.feet, played.contacts, view.fps)
     corrected = np.full((count, 2), np.nan) if played.correction is None else np.asarray(played.correction, float)
     hard = unknown.copy()
-    if view.reference is not None and count > jerk.SEAM_TO_JERK + 1:
-        values = jerk.jerk(played.positions, view.fps)
-        hard[jerk.SEAM_TO_JERK :][: len(values)] = jerk.ratios(values, view.speed, view.reference.jerk_p95)
+    if view.reference is not None and count > movement.SEAM_TO_JERK + 1:
+        values = movement.jerk(played.positions, view.fps)
+        hard[movement.SEAM_TO_JERK :][: len(values)] = movement.jerk_ratios(values, view.speed, view.reference.jerk_p95)
     return PerFrame(
         times=played.times, track=wanted, slide=slides, correction=corrected, jerk=hard, speed=view.speed,
-        root_error=root.root_error(played.pelvis, wanted, view.fps) if known else unknown,
-        pelvis_error=root.pelvis_error(played.pelvis, wanted) if known else unknown,
-        asked_speed=root.travel_speed(wanted, view.fps) if known else unknown,
+        root_error=movement.root_error(played.pelvis, wanted, view.fps) if known else unknown,
+        pelvis_error=movement.pelvis_error(played.pelvis, wanted) if known else unknown,
+        asked_speed=movement.travel_speed(wanted, view.fps) if known else unknown,
     )  # fmt: skip
 
 
 def footprints(view: View) -> tuple[Footprint, ...]:
     """Every stance, in the order of time."""
     played = view.played
-    spans = feet.stances(played.contacts)
-    travel = feet.stance_travel(played.feet[:, :, 1], spans)
+    spans = movement.stances(played.contacts)
+    travel = movement.stance_travel(played.feet[:, :, 1], spans)
     found = [_footprint(view, span, slide) for span, slide in zip(spans.tolist(), travel.tolist())]
     return tuple(sorted(found, key=lambda print_: (print_.start, print_.side)))
 

@@ -16,7 +16,8 @@ from ..motion.contacts import floor_height
 from ..motion.humanoid import heading_from_positions, side_and_part
 from ..motion.quaternion import about_up, rotate
 from ..motion.track import BALL_RADIUS
-from ..synthesis.quality import pieces, root
+from ..synthesis.quality import movement
+from ..synthesis.quality.played import played_rate
 from . import figures, realism
 from .reference import View
 
@@ -70,7 +71,7 @@ def clips(view: View) -> bytes:
         _clip_bar(bar, view, low, high, names)
     bar.set_yticks([])
     _title(bar, "clips and seams; ' marks a mirrored clip", "clip")
-    rate = np.append(pieces.played_rate(*view.source), np.nan)
+    rate = np.append(played_rate(*view.source), np.nan)
     rate[view.seams - 1] = np.nan
     warp.plot(view.played.times, rate, color=MIDDLE, lw=1)
     for limit in (0.85, 1.15):
@@ -168,7 +169,7 @@ def _draw_root(ax, view: View) -> None:
                 color="#777777")
         return
     times, pelvis = view.played.times, view.played.pelvis
-    error, smooth = root.pelvis_error(pelvis, view.wanted), root.root_error(pelvis, view.wanted, view.fps)
+    error, smooth = movement.pelvis_error(pelvis, view.wanted), movement.root_error(pelvis, view.wanted, view.fps)
     ax.plot(times, 100 * error, color="#bbbbbb", lw=1, label="pelvis, as it sways")
     ax.plot(times, 100 * smooth, color=LEFT, lw=1.4, label="root (1.5 s window)")
     ax.axhline(1.5, color="#999999", lw=0.8, ls="--", label="target for 95 % of root")
@@ -190,7 +191,7 @@ def _draw_feet(ax, view: View) -> None:
 def _draw_speed(ax, view: View) -> None:
     times = view.played.times
     if view.wanted is not None:
-        ax.plot(times, root.travel_speed(view.wanted, view.fps), color="#8fb8de", lw=3, label="asked by the track")
+        ax.plot(times, movement.travel_speed(view.wanted, view.fps), color="#8fb8de", lw=3, label="asked by the track")
     ax.plot(times, view.speed, color=MIDDLE, lw=1, label="played")
     if view.reference is not None and np.isfinite(view.reference.fastest):
         ax.axhline(1.15 * view.reference.fastest, color=RIGHT, lw=0.8, ls="--", label="fastest recording x 1.15")
@@ -205,7 +206,7 @@ def _draw_smoothness(ax, view: View) -> None:
     curve = realism.smoothness(played.motion.skeleton, played.positions, view.fps)
     ax.plot(played.times[1:], 100 * curve, color=MIDDLE, lw=1, label="from the frame before")
     if view.reference is not None:
-        level = view.reference.smoothness_p95[root.speed_class(view.speed)]
+        level = view.reference.smoothness_p95[movement.speed_class(view.speed)]
         ax.plot(played.times, 100 * level, color=LEFT, lw=1, ls="--", label="95 % of recordings at that speed")
     for number, seam in enumerate(view.seams):
         label = "seam" if number == 0 else None

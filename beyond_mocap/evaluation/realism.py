@@ -13,8 +13,8 @@ from ..library.features import feature_joints, raw_features
 from ..motion import quaternion
 from ..motion.humanoid import Humanoid, heading_from_positions
 from ..motion.skeleton import Skeleton
-from ..synthesis.quality import jerk
-from ..synthesis.quality.root import speed_class
+from ..synthesis.quality import movement
+from ..synthesis.quality.movement import speed_class
 
 VELOCITY_SECONDS = 0.12  # weighs m/s against metres, as `library.features.HORIZON`
 _ROWS_AT_ONCE = 512  # of distances, which bounds the memory
@@ -76,11 +76,11 @@ def nearest_distance(
 
 
 def real_p95(values: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """95th percentile (5,) m, by `jerk.real_p95`, in each speed class of speed (M,) m/s: of leave-one-clip-out
+    """95th percentile (5,) m, by `movement.real_p95`, in each speed class of speed (M,) m/s: of leave-one-clip-out
     distances (M,), infinite where a library has one clip only, or of uncut recordings' smoothness (M,), NaN between
     clips."""
     known = np.isfinite(values)
-    return jerk.real_p95(values[known], speed[known])
+    return movement.real_p95(values[known], speed[known])
 
 
 def unreal(distance: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:

@@ -25,9 +25,9 @@ from ..motion.humanoid import Humanoid, identify, stature
 from ..motion.motion import at_frames, forward_kinematics, pose_kinematics, resample
 from ..motion.skeleton import Skeleton
 from ..motion.track import Track
-from ..synthesis.quality import feet, jerk, pieces, root
+from ..synthesis.quality import movement
 from ..synthesis.quality.moments import moments
-from ..synthesis.quality.played import Played
+from ..synthesis.quality.played import Played, find_transitions
 from . import realism
 
 POSES_PER_SECOND = 10.0
@@ -67,9 +67,9 @@ class LibraryReference:
 
     index: path -> recording; first (C + 1,): each recording's first row; rate (C,): its own frames per second; the
     per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
-    NaN at a clip's ends. Speed classes are `root.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95 (5,)
-    m. poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a flat
-    foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
+    NaN at a clip's ends. Speed classes are `movement.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95
+    (5,) m. poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a
+    flat foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
     """
 
     fps: float
@@ -130,9 +130,9 @@ def build_reference(library: Library, fps: float) -> LibraryReference:
     measured = [measure(clip, fps) for clip in originals]
     lengths = [len(recording.sway) for recording in measured]
     first = np.concatenate([[0], np.cumsum(lengths)])
-    windows = [jerk.uncut_windows(recording.jerk, recording.speed) for recording in measured]
+    windows = [movement.uncut_windows(recording.jerk, recording.speed) for recording in measured]
     hard, speed = (np.concatenate(column) for column in zip(*windows))
-    jerk_p95 = jerk.real_p95(hard, speed)
+    jerk_p95 = movement.real_p95(hard, speed)
     poses, pose_p95 = _poses(measured, twins, identify(library.skeleton), fps)
     joined = {name: np.concatenate([getattr(recording, name) for recording in measured]) for name in _JOINED}
     return LibraryReference(
@@ -164,19 +164,20 @@ def measure(clip: Clip, fps: float) -> Recording:
     motion = resample(clip.recording, fps)
     skeleton, hips = motion.skeleton, identify(motion.skeleton).hips
     positions, rotations = forward_kinematics(motion)
-    pelvis, planted = positions[:, hips, :2], positions[:, feet.foot_joints(skeleton)]
+    pelvis, planted = positions[:, hips, :2], positions[:, movement.foot_joints(skeleton)]
     at = np.minimum(np.rint(np.arange(len(motion)) * clip.motion.fps / fps).astype(int), len(clip.motion) - 1)
     contacts = clip.contacts[at]
-    spans = feet.stances(contacts)
-    heel_rest, floor = feet.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
+    spans = movement.stances(contacts)
+    heel_rest, floor = movement.heel_rest_height(planted, contacts), float(np.percentile(planted[:, :, 1, 2], 2))
     return Recording(
         path=clip.path, rate=clip.motion.fps, features=realism.pose_features(skeleton, positions, fps, hips),
-        sway=root.sway(pelvis, fps), surge=root.surge(pelvis, fps), speed=root.travel_speed(pelvis, fps),
-        contact_speed=np.concatenate([feet.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
-        skating=np.append(feet.skating_steps(planted[:, :, 1], floor, fps), False), heel_rest=heel_rest,
-        support=feet.support_height(planted, contacts, heel_rest), tip=feet.tip_height(skeleton, positions, rotations),
-        jerk=jerk.jerk(positions, fps), smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
-        stances=spans, travel=feet.stance_travel(planted[:, :, 1], spans),
+        sway=movement.sway(pelvis, fps), surge=movement.surge(pelvis, fps), speed=movement.travel_speed(pelvis, fps),
+        contact_speed=np.concatenate([movement.contact_speeds(planted, contacts, fps), [[np.nan, np.nan]]]),
+        skating=np.append(movement.skating_steps(planted[:, :, 1], floor, fps), False), heel_rest=heel_rest,
+        support=movement.support_height(planted, contacts, heel_rest),
+        tip=movement.tip_height(skeleton, positions, rotations),
+        jerk=movement.jerk(positions, fps), smoothness=np.append(realism.smoothness(skeleton, positions, fps), np.nan),
+        stances=spans, travel=movement.stance_travel(planted[:, :, 1], spans),
     )  # fmt: skip
 
 
@@ -184,9 +185,9 @@ def _above(recording: Recording, real: np.ndarray) -> np.ndarray:
     """Per frame of a recording 1 where the window around it has more jerk than is real, 0 where not, NaN at its
     ends."""
     out = np.full(len(recording.sway), np.nan)
-    windows, speed = jerk.uncut_windows(recording.jerk, recording.speed)
-    start = jerk.REACH + jerk.SEAM_TO_JERK
-    out[start : start + len(windows)] = windows > real[root.speed_class(speed)]
+    windows, speed = movement.uncut_windows(recording.jerk, recording.speed)
+    start = movement.JERK_REACH + movement.SEAM_TO_JERK
+    out[start : start + len(windows)] = windows > real[movement.speed_class(speed)]
     return out
 
 
@@ -244,9 +245,9 @@ class View:
         self.stride = played.stride(library)
         self.rows = self._rows()
         self.used = np.rint(self.rows[np.isfinite(self.rows)]).astype(int)
-        self.seams = pieces.seams(*self.source)
-        self.speed = root.travel_speed(played.pelvis, self.fps)
-        self.wanted = None if track is None else root.track_at(track, played.times)
+        self.seams = find_transitions(*self.source)
+        self.speed = movement.travel_speed(played.pelvis, self.fps)
+        self.wanted = None if track is None else movement.track_at(track, played.times)
         self.moments = [] if timeline is None else moments(played, timeline.keys, self.stride, library)
 
     @property

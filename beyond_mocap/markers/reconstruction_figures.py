@@ -9,7 +9,7 @@ from ..base.errors import InputError
 from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
-from ..synthesis.quality.feet import contact_speeds, foot_joints, stance_travel, stances
+from ..synthesis.quality.movement import contact_speeds, foot_joints, stance_travel, stances
 from .pose.residuals import residuals
 
 

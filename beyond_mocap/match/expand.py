@@ -21,8 +21,8 @@ from ..library.library import Library
 from ..library.made import MADE_FOLDER
 from ..motion.motion import concatenate
 from ..motion.track.ball_path import BallPath
-from ..synthesis.construct.ball.meeting import eased
 from ..synthesis.construct.hand_over import handed_over
+from ..synthesis.construct.meeting import eased
 from ..synthesis.plan import Plan
 from ..synthesis.resolve_plan import resolve_plan
 from ..synthesis.search.edit_list import EditList, at_times

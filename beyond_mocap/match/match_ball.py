@@ -20,7 +20,7 @@ from ..motion.motion import Motion, pose_kinematics
 from ..motion.track import BALL_RADIUS, Track, clean
 from ..motion.track.ball_path import BallPath
 from ..motion.track.match_data import Match
-from ..synthesis.construct.ball.strike_at import Meeting, met_at
+from ..synthesis.construct.strike_at import Meeting, met_at
 from ..synthesis.known_touches import course_of
 from ..synthesis.plan import Plan
 from ..synthesis.take import KeyResult, Take
@@ -28,7 +28,7 @@ from ..synthesis.take import KeyResult, Take
 _STEP = 1e-4  # m, to which places are rounded, as files have them
 
 CLOSED = 0.15
-"""Metres of gap that are closed, as much as `synthesis.construct.ball.strike` closes; who misses the ball by more
+"""Metres of gap that are closed, as much as `synthesis.construct.strike` closes; who misses the ball by more
 plays as he does."""
 
 OPEN = 1e-3

@@ -3,7 +3,7 @@ between.
 
 The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
 `passes.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
-(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.ball.strike_at`). The ball
+(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.strike_at`). The ball
 is never moved.
 """
 
@@ -31,11 +31,11 @@ from ..motion.motion import Motion
 from ..motion.track import BALL_RADIUS, SampledTrack, Track
 from ..motion.track.ball_path import BallPath
 from ..motion.track.sampling import travel_direction
-from ..synthesis.construct.ball.strike import Touch
-from ..synthesis.construct.ball.strike_at import Meeting, Met, met_at
 from ..synthesis.construct.construction import Construction
 from ..synthesis.construct.gaze import CHEST, following
 from ..synthesis.construct.on_track import STANDS, follow_turning
+from ..synthesis.construct.strike import Touch
+from ..synthesis.construct.strike_at import Meeting, Met, met_at
 from ..synthesis.plan import Plan
 from ..synthesis.provenance import provenance_fields
 from ..synthesis.resolve_plan import resolve_plan

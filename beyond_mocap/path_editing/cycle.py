@@ -21,7 +21,7 @@ import numpy as np
 
 from ..base.errors import InputError
 from ..motion import quaternion
-from ..synthesis.construct.cross_fade import faded_rotations, share
+from ..synthesis.construct.transitions import fade_share, faded_rotations
 from .loops import Loop, find_loops, smooth_speed
 from .path_frame import Residuals
 
@@ -310,7 +310,7 @@ class _Stretches:
     def come(self) -> np.ndarray:
         """(R,) share of the beginning stretch."""
         after = self.around >= 0
-        given = share(self.through, after)
+        given = fade_share(self.through, after)
         return np.where(after, 1.0 - given, given)
 
     @property

@@ -14,7 +14,7 @@ from ..motion import contacts as foot_contacts
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
-from ..synthesis.quality import feet, jerk, root
+from ..synthesis.quality import movement
 
 MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
@@ -32,7 +32,7 @@ def figures(source, ridden, path, ground=None) -> dict:
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
     fps = ridden.motion.fps
     out = {"length_m": float(np.ptp(ridden.arc)) if len(ridden.arc) else 0.0,
-           "root_error_m": _spread(root.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
+           "root_error_m": _spread(movement.root_error(pelvis[:, :2], ridden.origin[:, :2], fps)),
            "root_error_own_m": _spread(_own_error(source, own)),
            "nearest_m": _spread(nearest(pelvis[:, :2], ridden.origin[:, :2], path, fps)),
            "kept_speed": kept_speed(source, ridden, own, pelvis, frames),
@@ -52,7 +52,7 @@ def _pelvis(motion: Motion, humanoid: bool) -> np.ndarray:
 def _own_error(source, own: np.ndarray) -> np.ndarray:
     """Distance (T,) m of the recording's root from its own path."""
     times = np.arange(len(own)) / source.motion.fps
-    return root.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
+    return movement.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
 
 
 def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndarray:
@@ -63,9 +63,9 @@ def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndar
     """
     low, high = path.domain
     line = path.at(np.linspace(low, high, 4001))[:, :2]
-    way = np.concatenate([zero_phase_hann(origin, fps, root.ROOT_WINDOW), line])
+    way = np.concatenate([zero_phase_hann(origin, fps, movement.ROOT_WINDOW), line])
     known = _filled(way[: len(origin)])
-    return cKDTree(known).query(zero_phase_hann(pelvis, fps, root.ROOT_WINDOW))[0]
+    return cKDTree(known).query(zero_phase_hann(pelvis, fps, movement.ROOT_WINDOW))[0]
 
 
 def _filled(line: np.ndarray) -> np.ndarray:
@@ -92,7 +92,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
         free &= np.abs(there - seam) > 0.75 * fps
     path = np.abs(step[free] / asked[free] - 1.0)
     speeds = [
-        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, root.ROOT_WINDOW), rate), axis=1)
+        np.linalg.norm(time_derivative(zero_phase_hann(p[:, :2], rate, movement.ROOT_WINDOW), rate), axis=1)
         for p, rate in ((pelvis, fps), (own, source.motion.fps))
     ]
     mine, his = speeds[0][:-1][free], speeds[1][frames][:-1][free]
@@ -104,13 +104,13 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
 def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
     """Jerk at the seams of a ride that cycles, against what the recording itself has at that speed."""
     seams = np.asarray(ridden.seams, int)
-    mine, his = (jerk.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
-    speed = root.travel_speed(own[:, :2], source.motion.fps)
-    windows, at = jerk.uncut_windows(his, speed)
+    mine, his = (movement.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
+    speed = movement.travel_speed(own[:, :2], source.motion.fps)
+    windows, at = movement.uncut_windows(his, speed)
     if not len(windows) or not len(seams):
         return {"seams": len(seams), "max": None, "median": None}
-    real = jerk.real_p95(windows, at)
-    ratios = jerk.seam_ratios(mine, seams, root.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
+    real = movement.real_p95(windows, at)
+    ratios = movement.seam_ratios(mine, seams, movement.travel_speed(pelvis[:, :2], ridden.motion.fps), real)
     return {"seams": len(seams), "max": float(ratios.max()), "median": float(np.median(ratios))}
 
 
@@ -144,23 +144,23 @@ def carried(ridden) -> np.ndarray:
 
 def _foot_places(motion: Motion) -> np.ndarray:
     """(T, 2, 2, 3) m: side, heel and toe."""
-    return forward_kinematics(motion)[0][:, feet.foot_joints(motion.skeleton)]
+    return forward_kinematics(motion)[0][:, movement.foot_joints(motion.skeleton)]
 
 
 def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: np.ndarray | None = None) -> dict:
     """Mean speed of standing feet (flat: heel and toe stand) and of standing points, cm/s; how far toes travel within a
     stance, mm. used: frames that count, None for all."""
     flat = points.all(axis=2)
-    speeds = feet.contact_speeds(places, flat, fps)
+    speeds = movement.contact_speeds(places, flat, fps)
     point = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) * fps
     point = np.where(points[:-1] & points[1:], point, np.nan)
     if used is not None:
         kept = used[used < len(speeds)]
         speeds, point = speeds[kept], point[kept]
-    travel = feet.stance_travel(places[:, :, 1], feet.stances(flat))
+    travel = movement.stance_travel(places[:, :, 1], movement.stances(flat))
     return {f"{name}contact_cm_s": 100.0 * _mean(speeds), f"{name}point_cm_s": 100.0 * _mean(point),
             f"{name}stance_mm_median": 1000.0 * float(np.median(travel)) if len(travel) else np.nan,
-            f"{name}stances_over_21mm": _mean((travel > feet.NOTICED_SLIDE).astype(float))}
+            f"{name}stances_over_21mm": _mean((travel > movement.NOTICED_SLIDE).astype(float))}
 
 
 def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray, recording: Motion, ground) -> dict:
@@ -173,7 +173,7 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
     above = places - surface[..., None] * [0.0, 0.0, 1.0]
     own_floor, toe_rest = foot_contacts.floor_height(recording), foot_contacts.recorded_floor(recording)[1]
     ankle = foot_contacts.sole_height(recording.skeleton)  # of a flat foot without toes
-    rest = feet.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
+    rest = movement.heel_rest_height(_foot_places(recording), foot_contacts.detect(recording)) - own_floor
     heel_rest = max(rest, ankle) + toe_rest - ankle
     lower = np.minimum(above[..., 1, 2] - toe_rest, above[..., 0, 2] - heel_rest)
     standing = lower[flat & np.isfinite(lower)]
@@ -209,7 +209,7 @@ def knee_jerk(source, ridden, frames: np.ndarray) -> dict:
     """The knees' third difference, its 99th percentile and largest, over the recording's own in the frames it used."""
     body = identify(source.motion.skeleton)
     knees = [body.left.lower_leg, body.right.lower_leg]
-    mine, his = (jerk.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))
+    mine, his = (movement.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))
     used = np.unique(frames)
     his = his[used[used < len(his)]]
     if not len(mine) or not len(his):

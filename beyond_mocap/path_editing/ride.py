@@ -23,7 +23,7 @@ from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain
 from ..motion.track import zero_phase_hann
-from ..synthesis.construct.banking import banked, bent_forward, missing_lean
+from ..synthesis.construct.on_track import bend_forward, lean_into_curves, missing_lean
 from . import ground_contact, path_frame, path_time
 from .cycle import cycled
 from .detour import with_detours
@@ -306,11 +306,11 @@ def _leaned(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Ti
     lean = missing_lean(since * np.cos(moving.slope) * fps, moving.heading, own_speed, turn=rows.turn, seams=seams,
                         fps=fps, slow=LEANS_FROM)
     if np.abs(lean).max(initial=0.0) > 1e-9:
-        rotations = banked(rows.skeleton, rotations, moving.heading, lean)
+        rotations = lean_into_curves(rows.skeleton, rotations, moving.heading, lean)
     steeper = zero_phase_hann((moving.slope - own_slope)[:, None], fps, SLOPE_SECONDS)[:, 0]
     if np.abs(steeper).max(initial=0.0) > 1e-6:
         forward = np.clip(INTO_SLOPE * steeper, -MOST_FORWARD, MOST_FORWARD)
-        rotations = bent_forward(rows.skeleton, rotations, moving.heading, forward)
+        rotations = bend_forward(rows.skeleton, rotations, moving.heading, forward)
     return rotations
 
 

@@ -4,7 +4,7 @@
 
 What `synthesize` and `resynthesize` do with a solved ball (`solve_ball`): before the search key moments move to solved
 touches; when the body is done, the ball goes through the places where it was met, as solved in between, and in dribbles
-step by step from foot to foot (`synthesis.construct.ball.dribble`).
+step by step from foot to foot (`synthesis.construct.dribble`).
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from ..ball.tracked.kinds import THROW_IN, TOUCH_KINDS
 from ..ball.tracked.solve import SolvedBall, SolvedTouch
 from ..base.errors import InputError, TimedLine
 from ..motion.track import BALL_RADIUS
-from .construct.ball.dribble import dribble
-from .construct.ball.meeting import led, lofted
-from .construct.ball.strike import held_frames
+from .construct.dribble import dribble
+from .construct.meeting import led, lofted
+from .construct.strike import held_frames
 from .plan import Plan, ResolvedPlan, SolvedCourse, Touched
 from .take import DribbleTouch, KeyResult, Take
 

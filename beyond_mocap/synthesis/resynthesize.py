@@ -25,11 +25,9 @@ from ..library.library import Library
 from ..motion.motion import Motion
 from ..motion.track import SampledTrack
 from ..motion.track.ball_path import BallPath
-from .construct.construction import Construction
-from .construct.hand_over import handed_over, old_share
-from .construct.key_moments import find_touches, key_results
-from .construct.old_motion import OldMotion
-from .construct.smoothing import reaches
+from .construct.construction import Construction, find_touches, key_results
+from .construct.hand_over import OldMotion, handed_over, old_share
+from .construct.transitions import spread_reaches
 from .own_size import taken_in_library_size
 from .plan import Plan, ResolvedPlan
 from .provenance import sources_shown, words_shown
@@ -249,7 +247,7 @@ class _Update:
 
     def _spread(self, seams: np.ndarray) -> set[tuple[int, float]]:
         longest = 0.5 * self.plan.asked.seam_window * self.plan.fps
-        return set(zip(seams.tolist(), reaches(seams, len(self.index), longest).tolist()))
+        return set(zip(seams.tolist(), spread_reaches(seams, len(self.index), longest).tolist()))
 
     def make(self, stretch: Stretch) -> None:
         """Makes output frames first .. end anew and hands over to the old ones around them."""

@@ -26,8 +26,7 @@ from ..library.library import Library
 from ..motion.foot_plant import Planted
 from ..motion.motion import Motion, at_frames
 from ..motion.track.ball_path import BallPath
-from .construct.construction import Construction
-from .construct.key_moments import find_touches, key_results
+from .construct.construction import Construction, find_touches, key_results
 from .construct.pins import look_axis, pinned
 from .construct.steps import Steps
 from .construct.thesis_methods import lay_out_blocks

@@ -23,7 +23,7 @@ from ..motion import quaternion
 from ..motion.hand import hand_of, usual_centre
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
-from ..synthesis.quality.jerk import jerk
+from ..synthesis.quality.movement import jerk
 from .networks.chains import EFFECTORS, chains_of
 from .networks.description import scaled
 from .networks.example import Example, describe

@@ -21,10 +21,10 @@ from ..motion.humanoid import heading_from_positions, identify
 from ..motion.motion import Motion, at_frames, forward_kinematics, place, pose_kinematics, resample, world_rotation
 from ..motion.retargeting.neutral import neutral_stance
 from ..motion.skeleton import Skeleton
-from ..synthesis.construct.ball.carry import Body, Resting, leg, limb_carried
-from ..synthesis.construct.ball.meeting import eased
-from ..synthesis.construct.stepped_over import stepped_over
-from ..synthesis.quality.jerk import jerk, uncut_windows, windowed
+from ..synthesis.construct.carry import Body, Resting, leg, limb_carried
+from ..synthesis.construct.hand_over import stepped_over
+from ..synthesis.construct.meeting import eased
+from ..synthesis.quality.movement import jerk, uncut_windows, windowed
 
 FADE = 0.5
 """Seconds in which a throw goes over into what surrounds it, at either end."""

@@ -15,7 +15,7 @@ from ..library.library import Library
 from ..motion.humanoid import stature
 from ..motion.motion import Motion, forward_kinematics, resample
 from ..motion.track import Track, zero_phase_hann
-from ..synthesis.construct.ball.meeting import eased
+from ..synthesis.construct.meeting import eased
 from ..synthesis.plan import Plan
 from .join_throw import FADE, blend_bodies, hold_ends
 from .run_up import SMOOTH, RunUpResult, construct_run_up

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..motion.motion import Motion
-from ..synthesis.construct.ball.carry import Body, Resting, limb_carried
+from ..synthesis.construct.carry import Body, Resting, limb_carried
 from .letting_go import AtFoot, InHand, carried
 
 Hold = Callable[[np.ndarray, np.ndarray], np.ndarray]

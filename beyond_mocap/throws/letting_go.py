@@ -24,7 +24,7 @@ from ..base.vectors import unit_vector
 from ..motion import quaternion
 from ..motion.humanoid import identify
 from ..motion.motion import Motion, cubic_at, forward_kinematics, pose_kinematics
-from ..synthesis.construct.ball.carry import arm, leg
+from ..synthesis.construct.carry import arm, leg
 
 BEFORE, AFTER = 0.4, 0.4
 """Seconds before and after the release within which a wrist or ankle may be moved."""

@@ -26,8 +26,7 @@ from ..motion.humanoid import heading
 from ..motion.motion import Motion, resample
 from ..motion.retargeting.retarget import Retargeter
 from ..motion.track import SampledTrack, Track, zero_phase_hann
-from ..synthesis.construct.construction import Construction
-from ..synthesis.construct.key_moments import find_touches, key_results
+from ..synthesis.construct.construction import Construction, find_touches, key_results
 from ..synthesis.known_touches import solve_touches
 from ..synthesis.plan import Plan, ResolvedPlan
 from ..synthesis.resolve_plan import resolve_plan

@@ -133,12 +133,12 @@ def _stand_spread(motion: Motion, points: np.ndarray) -> float:
 
 def slide(motion: Motion, standing: np.ndarray) -> Slide:
     """How far the feet of a motion slide while `standing` (T, 2) says that they stand."""
-    from ...beyond_mocap.synthesis.quality import feet
+    from ...beyond_mocap.synthesis.quality import movement
 
-    joints = feet.foot_joints(motion.skeleton)
+    joints = movement.foot_joints(motion.skeleton)
     places = forward_kinematics(motion)[0][:, joints]
-    speeds = feet.contact_speeds(places, standing, motion.fps)
-    travel = feet.stance_travel(places[:, :, 1], feet.stances(standing))
+    speeds = movement.contact_speeds(places, standing, motion.fps)
+    travel = movement.stance_travel(places[:, :, 1], movement.stances(standing))
     mean = float(np.nanmean(speeds)) if np.isfinite(speeds).any() else 0.0
     return Slide(100.0 * mean, 1000.0 * float(travel.max(initial=0.0)))
 

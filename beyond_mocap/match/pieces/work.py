@@ -20,7 +20,7 @@ from ...library.library import Library
 from ...motion.track import Track
 from ...motion.track.ball_path import BallPath
 from ...synthesis.provenance import Provenance, provenance_of, write_provenance
-from ...synthesis.quality import feet, root
+from ...synthesis.quality import movement
 from ...synthesis.quality.played import Played, played_from_take
 from ...synthesis.take import Take
 from ..crowd.crowd_window import CrowdPart, crowd_window
@@ -229,13 +229,13 @@ def _joined(name: str, values: list, weights: Sequence[float]):
 
 def _curves(played: Played, track: Track, overlap: np.ndarray, ball: BallPath):
     """(name, values (T,) or (T, 2), what stands for a second of them)."""
-    wanted = root.track_at(track, played.times)
+    wanted = movement.track_at(track, played.times)
     skate = np.full((len(played.motion), 2), np.nan)
-    skate[1:] = 100.0 * feet.contact_speeds(played.feet, played.contacts, played.motion.fps)
+    skate[1:] = 100.0 * movement.contact_speeds(played.feet, played.contacts, played.motion.fps)
     place = [np.interp(played.times, ball.times, ball.positions[:, axis], np.nan, np.nan) for axis in (0, 1)]
     away = np.linalg.norm(played.pelvis - np.stack(place, axis=1), axis=1)
     return (
-        ("root_error_m", root.root_error(played.pelvis, wanted, played.motion.fps), np.mean),
+        ("root_error_m", movement.root_error(played.pelvis, wanted, played.motion.fps), np.mean),
         ("skate_cm_s", skate, np.mean),
         ("overlap_m", np.asarray(overlap, dtype=float), np.max),
         ("ball_m", away, np.min),

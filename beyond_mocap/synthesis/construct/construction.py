@@ -5,8 +5,9 @@
     planted, ball = construction.meet_ball(planted, steps)
 
 Transitions are faded, heading and root follow the track, the body leans into its curves, feet are held where they are
-in contact or step where they would be dragged, and what strikes is brought to the ball. How each step is done stands
-in `polish`; what differs between the four is an argument here.
+in contact or step where they would be dragged, and what strikes is brought to the ball. How each step is done stands in
+a module of its own; what differs between the four is an argument here. `find_touches` says where the body may meet the
+ball, `key_results` how each key moment came out.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ from functools import cached_property
 
 import numpy as np
 
+from ...annotation import spoken
+from ...annotation.ball_contact import striking_part
 from ...annotation.gaits import wanted_offset
 from ...library.library import Library
 from ...motion import quaternion
@@ -24,15 +27,26 @@ from ...motion.foot_plant import Planted, plant
 from ...motion.track import SampledTrack
 from ..own_size import real_ball
 from ..plan import ResolvedPlan
-from ..search.footage import Footage, overlap
-from .ball.strike import Touch, strike
-from .banking import banked, missing_lean
-from .cross_fade import faded_rotations, faded_values, share
-from .face_ball import turned_to_ball
-from .give import give
-from .old_motion import OldMotion
-from .on_track import facing, firmness, pulled_to_track, root_with_sway
+from ..search.edit_list import EditList
+from ..search.footage import Footage, Shown, overlap
+from ..search.wanted import Wanted, needed
+from ..take import KeyResult
+from .hand_over import OldMotion
+from .on_track import (
+    absorb_foot_slide,
+    facing,
+    lean_into_curves,
+    missing_lean,
+    pulled_to_track,
+    root_with_sway,
+    turn_to_ball,
+    turning_firmness,
+)
 from .steps import Steps, steps
+from .strike import Touch, strike
+from .transitions import fade_share, faded_rotations, faded_values
+
+OTHERWISE = 0.4  # s around a key moment that no clip shows in which the body comes to the ball and goes back
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -67,7 +81,7 @@ class Construction:
         as Faustino's window."""
         source = self.source
         over = overlap(self.library, source, 0.25 * self.plan.asked.seam_window * self.plan.fps)
-        weight = share(over.through, over.after)
+        weight = fade_share(over.through, over.after)
         return replace(
             source,
             pose=faded_rotations(source.pose, over.at, over.pose, over.through, over.after),
@@ -114,8 +128,8 @@ class Construction:
     def _turn_to_ball(self, heading: np.ndarray) -> np.ndarray:
         ground = root_with_sway(self.track.positions, self.smooth.sway, heading)
         root, pose = np.column_stack([ground, self.smooth.height]), apply_heading(self.smooth.pose, heading)
-        return turned_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
-                              fps=self.track.fps)
+        return turn_to_ball(self.library.skeleton, root, pose, ball=self.track.ball, touches=self.touches,
+                            fps=self.track.fps)
 
     def _pull_to_track(self, ground: np.ndarray) -> np.ndarray:
         window = self.plan.asked.root_window
@@ -128,7 +142,7 @@ class Construction:
         track, smooth = self.track, self.smooth
         lean = missing_lean(track.speed, track.direction, smooth.velocity, turn=smooth.turn, seams=smooth.seams,
                             fps=self.plan.fps)
-        return banked(self.library.skeleton, pose, track.direction, lean)
+        return lean_into_curves(self.library.skeleton, pose, track.direction, lean)
 
     def _plant_feet(self, root: np.ndarray, pose: np.ndarray) -> tuple[Planted, Steps]:
         """Feet held or stepping; no steps are added where the ball may be met, nor where the old motion stays."""
@@ -146,38 +160,68 @@ class Construction:
     def _absorb_foot_slide(self, root: np.ndarray, taken: Steps, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Root (T, 3) m and local rotations (T, J, 4) of a body that yields where its feet would slide, as far as it is
         `free` (T,) to: 1, or nothing at 0."""
-        move, turn = give(self.library.skeleton, root, taken.rotations, taken.standing, self.plan.fps)
+        move, turn = absorb_foot_slide(self.library.skeleton, root, taken.rotations, taken.standing, self.plan.fps)
         pulled = pulled_to_track(root[:, :2] + move, self.track.raw, self.plan.fps, self.plan.asked.root_window)
         ground = root[:, :2] + free[:, None] * (pulled - root[:, :2])
         return np.concatenate([ground, root[:, 2:]], axis=1), apply_heading(taken.rotations, free * turn)
 
 
 def apply_heading(pose: np.ndarray, heading: np.ndarray) -> np.ndarray:
-    """Turn poses about the vertical.
-
-    Args:
-        pose: (T, J, 4) local rotations, the root's in the facing frame.
-        heading: (T,) rad.
-
-    Returns:
-        (T, J, 4) local rotations of a body that faces there.
-    """
+    """Turn poses (T, J, 4) local, the root's in the facing frame, so that the body faces heading (T,) rad."""
     out = pose.copy()
     out[:, 0] = quaternion.multiply(quaternion.about_up(heading), pose[:, 0])
     return out
 
 
 def solve_heading(track: SampledTrack, source: Footage, given: np.ndarray | None = None) -> np.ndarray:
-    """Solve the compromise between the track's direction and the source's own turning.
+    """(T,) rad, unwrapped: the compromise between the track's direction and the source's own turning.
 
-    Args:
-        track: T frames; a body that stands or goes slowly turns to what it looks at there.
-        source: T frames without jumps.
-        given: (T,) rad that the heading has to be, NaN where it is free.
-
-    Returns:
-        (T,) rad, unwrapped.
+    track: T frames; a body that stands or goes slowly turns to what it looks at there. source: T frames without jumps.
+    given: (T,) rad that the heading has to be, NaN where it is free.
     """
-    firm = firmness(source.standing, source.height, track.fps)
+    firm = turning_firmness(source.standing, source.height, track.fps)
     aim = track.direction + wanted_offset(track)
     return facing(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)
+
+
+def find_touches(library: Library, fps: float, edit: EditList, keys: tuple[KeyResult, ...]) -> tuple[Touch, ...]:
+    """Where the body may meet the ball: every key moment that is played, and every one for which the library has no
+    clip at all, so that something else is shown: there the asked part of that comes to the ball if it is near enough
+    (a runner's head to a header). In frames at `fps`."""
+    found, served = [], set()
+    for placed in edit.keys:
+        result = keys[placed.wanted]
+        entry, leave = np.multiply(needed(library, placed.key), fps / library.fps)
+        found.append(Touch(result.frame, result.words, float(entry), float(leave)))
+        served.add(placed.wanted)
+    alone = OTHERWISE * fps
+    for number, result in enumerate(keys):
+        lacks = result.used_instead is not None and number not in served and not striking_part(result.words)
+        if lacks and all(abs(result.frame - touch.frame) > alone for touch in found):
+            found.append(Touch(result.frame, result.asked.words, alone, alone))
+    return tuple(found)
+
+
+def key_results(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown) -> tuple[KeyResult, ...]:
+    """How every key moment of an order came out in `played`, whose frames are at `fps`."""
+    return tuple(_key_result(library, fps, order, edit=edit, played=played, number=number)
+                 for number in range(len(order.keys)))
+
+
+def _key_result(library: Library, fps: float, order: Wanted, edit: EditList, played: Shown, number: int) -> KeyResult:
+    """How key moment `number` came out: where its clip's key frame is played, or what stands in for it."""
+    key = order.keys[number]
+    at = key.frame * fps / library.fps
+    near = int(np.clip(round(at), 0, len(played.clip) - 1))
+    clip, shown = int(played.clip[near]), float(played.clip_frame[near])
+    placed = next((p for p in edit.keys if p.wanted == number and p.key.clip == clip), None)
+    words = spoken(placed.key.words if placed else library.clips[clip].words_at(shown))
+    if placed is not None:
+        inside = np.flatnonzero(played.piece == played.piece[near])
+        if len(inside) > 1 and np.all(np.diff(played.clip_frame[inside]) > 0):
+            at = float(np.interp(placed.key.frame, played.clip_frame[inside], inside))
+        shown = placed.key.frame
+    source = library.clips[clip]
+    instead = words if key.used_instead and not key.choices else key.used_instead
+    return KeyResult(asked=key.asked, frame=at, clip=source.path, clip_frame=shown, mirrored=source.mirrored,
+                     words=words, used_instead=instead)

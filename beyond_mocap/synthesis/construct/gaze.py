@@ -2,7 +2,7 @@
 
 Where the head should turn is a continuous function of the direction in which the ball lies as the body sees it. Ahead
 it is that direction, within what a neck can do; to the side it stays at its limit; behind the body it goes back to
-looking ahead, and so changes sides without a jump; overhead, where no side is told, it looks up. The way there is then
+looking ahead, and so changes sides without a jump; overhead, where there is no side, it looks up. The way there is then
 smoothed over time. Neck and chest take a share of each turn.
 """
 
@@ -19,24 +19,15 @@ from ...motion.humanoid import heading_from_positions, identify
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.track import zero_phase_hann
 
-MOST_YAW, MOST_UP, MOST_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)
-"""How far from straight ahead of the body a gaze that follows a ball turns at most."""
-
-CHEST, NECK = 0.12, 0.35
-"""Shares of a turn that chest and neck take; the head takes the rest."""
-
-SECONDS = 0.4
-"""Window over which the head's turning is smoothed."""
-
+MOST_YAW, MOST_UP, MOST_DOWN = np.radians(75.0), np.radians(50.0), np.radians(55.0)  # from straight ahead of the body
+CHEST, NECK = 0.12, 0.35  # shares of a turn that chest and neck take; the head takes the rest
+SECONDS = 0.4  # window over which the head's turning is smoothed
 _OVERHEAD = 0.5  # length on the ground of a unit direction below which its side counts less and less
 _BEHIND = 0.5  # cosine from straight behind beyond which the head begins to turn back
 
 
 def following(
-    motion: Motion,
-    places: np.ndarray,
-    look: np.ndarray,
-    share: np.ndarray | float = 1.0,
+    motion: Motion, places: np.ndarray, look: np.ndarray, share: np.ndarray | float = 1.0,
     chest: np.ndarray | float = CHEST,
 ) -> Motion:
     """The motion with its head turned to follow `places` (T, 3) m, NaN where there is nothing to look at.
@@ -52,9 +43,8 @@ def following(
     joints, world = forward_kinematics(motion)
     head = body.head_or_neck
     facing = heading_from_positions(motion.skeleton, joints)
-    away = _held(places, known) - joints[:, head]
-    seen = quaternion.rotate(quaternion.about_up(-facing), away)
-    yaw, pitch = _smoothed(seen, motion.fps).T
+    seen = quaternion.rotate(quaternion.about_up(-facing), _held(places, known) - joints[:, head])
+    yaw, pitch = zero_phase_hann(head_angles(seen), motion.fps, SECONDS).T
     wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
     wanted = quaternion.rotate(quaternion.about_up(facing), wanted)
     sight = quaternion.rotate(world[:, head], np.broadcast_to(look, wanted.shape))
@@ -80,11 +70,6 @@ def _limited(angle: np.ndarray, most: float) -> np.ndarray:
     free = 0.75 * most
     over = np.maximum(np.abs(angle) - free, 0.0)
     return np.sign(angle) * (np.minimum(np.abs(angle), free) + (most - free) * np.tanh(over / (most - free)))
-
-
-def _smoothed(seen: np.ndarray, fps: float) -> np.ndarray:
-    """(T, 2) `head_angles` over time, without jerks."""
-    return zero_phase_hann(head_angles(seen), fps, SECONDS)
 
 
 def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:

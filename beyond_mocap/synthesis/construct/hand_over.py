@@ -1,31 +1,113 @@
-"""A stretch that was made anew joined to the frames around it, which stay: no jump, and no foot that slides for it.
+"""A stretch that is constructed again joined to the motion around it, which stays: no jump, and no foot that slides.
 
-Around the stretch both motions show the same footage, but what was solved over all frames (how far a foot is shifted,
-how low the pelvis goes) may differ there by some centimetres. Root and joints go over from the one to the other within
-the hand-over; feet go over at once, where they are in the air. A foot that stands at the border stands where the old
-motion has it until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all.
+Around the stretch both motions show the same source frames, but what was solved over all frames (how far a foot is
+shifted, how low the pelvis goes) may differ there by some centimetres. Root and joints go over from the one to the
+other within the hand-over; feet go over at once, where they are in the air. A foot that stands at the border stands
+where the old motion has it until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all. Where
+both motions stand still elsewhere, feet step over (`stepped_over`).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 
+from ...base.easing import quintic_step_by_powers
 from ...motion import quaternion
-from ...motion.foot_plant import shift
+from ...motion.foot_plant import plant, shift
 from ...motion.humanoid import Limb, identify
 from ...motion.motion import pose_kinematics, world_rotation
 from ...motion.skeleton import Skeleton
-from .ball.carry import Body, Resting, leg, limb_carried
-from .ball.meeting import eased
+from ...motion.track import SampledTrack
+from ...motion.track.sampling import MOVING_SPEED
+from .carry import Body, Resting, leg, limb_carried
+from .on_track import pulled_to_track
+from .steps import steps
 
 Pose = tuple[np.ndarray, np.ndarray]
+
+_MOST_TURN = 1.5 * np.pi  # rad that a body may turn on the spot so as to turn the way it did before
+_OFFSET_SECONDS = 1.0  # in a stretch over which the root forgets how far off the old one was at its end
+_AROUND = 0.5  # s on either side of the stretch that are looked at
+_JOINS = 0.12  # s at either end of it in which what is planted goes over into what stays
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class OldMotion:
+    """What was shown before in the W frames of a window.
+
+    root: (W, 3) m.
+    rotation: (W, 4) of the root joint.
+    stepped: (W, 2) bool, extra steps of either foot.
+    share: (W,) of the old motion in what comes out, 0 where it is replaced.
+    stretch: first and end frame of the window between which it is free.
+    """
+
+    root: np.ndarray
+    rotation: np.ndarray
+    stepped: np.ndarray
+    share: np.ndarray
+    stretch: tuple[int, int]
+
+    @property
+    def stays(self) -> np.ndarray:
+        """(W,) bool: frames in which some of it stays."""
+        return self.share > 0.0
+
+    def heading_of(self, pose: np.ndarray) -> np.ndarray:
+        """(W,) rad with which poses (W, J, 4) out of the facing frame face as the old motion; NaN where free."""
+        heading = quaternion.yaw(quaternion.multiply(self.rotation, quaternion.inverse(pose[:, 0])))
+        heading[~self.stays] = np.nan
+        return heading
+
+    def turned_alike(self, track: SampledTrack, heading: np.ndarray) -> SampledTrack | None:
+        """The track (W frames) with the direction in which a body turns the same way round as the old one, whose new
+        heading on it is (W,) rad, unwrapped; None where both turn alike, or where the body is nowhere so slow that both
+        ways will do."""
+        old = np.unwrap(quaternion.yaw(self.rotation))
+        first, end = max(self.stretch[0] - 1, 0), min(self.stretch[1], len(heading) - 1)
+        turns = np.round((heading[end] - heading[first] - old[end] + old[first]) / (2.0 * np.pi))
+        slow = track.speed < MOVING_SPEED
+        middle = first + int(np.argmin(track.speed[first : end + 1]))
+        if turns == 0 or not slow[middle]:
+            return None
+        fast = np.flatnonzero(~slow[first : end + 1]) + first
+        low, high = max(fast[fast < middle], default=first), min(fast[fast > middle], default=end)
+        if abs(heading[high] - heading[low] - 2.0 * np.pi * turns) > _MOST_TURN:
+            return None
+        ramp = quintic_step_by_powers((np.arange(len(heading)) - low) / max(high - low, 1))
+        return replace(track, direction=track.direction - 2.0 * np.pi * turns * ramp)
+
+    def pulled(self, ground: np.ndarray, track: SampledTrack, window: float) -> np.ndarray:
+        """Pull the constructed root, ground (W, 2) m, onto the track (W frames) between what stays; near that it sets
+        out from where the old one is. window: seconds, as `pulled_to_track` has it."""
+        old, stays = self.root[:, :2], self.stays
+        first, end = self.stretch
+        at, fade = np.arange(len(ground)), max(1.0, min(_OFFSET_SECONDS * track.fps, end - first))
+        root = ground.copy()
+        for edge in (edge for edge in (first - 1, end) if 0 <= edge < len(ground)):
+            near = quintic_step_by_powers(1.0 - np.abs(at - edge) / fade)[:, None]
+            root += np.where(stays[:, None], 0.0, near * (old - ground)[edge])
+        root = np.where(stays[:, None], old, root)
+        pulled = pulled_to_track(root, track.raw, track.fps, window)
+        return pulled + self.share[:, None] * (old - pulled)
+
+    def kept_steps(self) -> np.ndarray:
+        """(W, 2) bool: the steps that are taken, in whole or in part, where the old motion stays."""
+        kept = np.zeros_like(self.stepped)
+        for side in range(kept.shape[1]):
+            stepped = self.stepped[:, side]
+            number = np.cumsum(np.diff(stepped, prepend=False)) * stepped
+            kept[:, side] = stepped & np.isin(number, number[self.stays & stepped])
+        return kept
 
 
 def old_share(count: int, stretch: tuple[int, int], frames: int) -> np.ndarray:
     """(count,) share of the old motion: 0 within the `stretch` (first, end), 1 from `frames` around it on."""
     at = np.arange(count)
     away = np.maximum(stretch[0] - at, at - stretch[1] + 1) / (frames + 1.0)
-    return eased(away, np.ones(count))
+    return quintic_step_by_powers(away)
 
 
 def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, standing: np.ndarray, fps: float) -> Pose:
@@ -52,10 +134,33 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
     return root, rotations
 
 
+def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: tuple[int, int], fps: float) -> Pose:
+    """Root (T, 3) m and local rotations (T, J, 4) with feet that stand and step within the frames first .. end of
+    `stretch`, and are as they were elsewhere, bit for bit. standing (T, 2, 2) bool: heels and toes, left and right,
+    that stand in whichever motion is shown most."""
+    first, end = stretch
+    around, joins = int(_AROUND * fps), max(int(round(_JOINS * fps)), 1)
+    if end - first < 2 * joins + 3:
+        return pose
+    low, high = max(first - around, 0), min(end + around, len(pose[0]))
+    root, rotations = pose[0][low:high], pose[1][low:high]
+    inside = (np.arange(low, high) >= first) & (np.arange(low, high) < end)
+    taken = steps(skeleton, root, rotations, standing[low:high], fps, free=inside)
+    swayed = root + np.column_stack([taken.sway, np.zeros(len(root))])
+    found = plant(skeleton, swayed, taken.rotations, taken.standing, fps, moves=taken.moves, levels=False)
+    share = old_share(high - low, (first + joins - low, end - joins - low), joins)
+    share[~inside] = 1.0
+    new = handed_over(skeleton, (found.root, found.rotations), (root, rotations), share=share, standing=taken.standing,
+                      fps=fps)
+    changed = pose[0].copy(), pose[1].copy()
+    for whole, part in zip(changed, new):
+        whole[first:end] = part[first - low : end - low]
+    return changed
+
+
 def _sunk(skeleton: Skeleton, limb: Limb, place, foot, motions: list[np.ndarray], share) -> np.ndarray:
     """(T,) m by which a foot's joints would be below the ground, which is at height 0, and below where either motion
-    has
-    them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
+    has them: what a standing foot is shifted and turned by fades as it lifts, and may take its toes down.
 
     place (T, 3) m and foot (T, 4): of the ankle, world; motions: joints' places (T, J, 3) m of the new and the old one.
     """

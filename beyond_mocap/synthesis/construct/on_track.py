@@ -1,47 +1,65 @@
-"""A motion laid on the ground: which way the body faces, and where its root goes, at every frame.
+"""A motion laid on a track: which way the body faces, where its root goes and how it leans, at every frame.
 
 The body's own sway about its path is kept: the root is the track plus the sway, turned with the body. Facing is not the
-direction of travel; what is kept is the angle between the two that the recording had.
+direction of travel; what is kept is the angle between the two that the recording had. At a touch the body turns so that
+what strikes points at the ball (players turn into their kicks), it leans into curves as far as the recording does not,
+and it yields a little where its feet would slide.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ...annotation.ball_contact import surfaces
+from ...annotation.striking import faster_middle
 from ...base.banded_least_squares import BandedLeastSquares
 from ...base.time_series import runs
 from ...base.vectors import arctan2
 from ...motion import quaternion
+from ...motion.foot_plant import firmness
+from ...motion.humanoid import identify
+from ...motion.motion import pose_kinematics, world_rotation
+from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
+from .strike import Touch
 
 TURN_WEIGHT = 12.0  # of the recording's own turning per frame, against the direction of travel
-OFF_THE_FEET = 40.0
-"""How many times firmer the recording's own turning is followed by who flies, lies or kneels and so cannot turn at
-will."""
-
+OFF_THE_FEET = 40.0  # times firmer, where the body flies, lies or kneels and so cannot turn at will
 _FLIGHT_SECONDS = 0.3  # without a foot on the ground; the flights of running are shorter
 _LOW = 0.6  # of the usual height of the hips
-
-STANDS = 0.3
-"""m/s; below it a direction of travel says nothing about facing."""
+STANDS = 0.3  # m/s; below it a direction of travel says nothing about facing
 
 FAINT, AIM = 1e-4, 0.004
 """Weights of the pull to where a standing body would turn: at any speed, and at rest (half way within 1.3 s)."""
 
-HOLD = 1e6
-"""Weight of a facing that is given: so much more than all else that it stays."""
-
+HOLD = 1e6  # weight of a facing that is given: so much more than all else that it stays
 ROOT_WINDOW = 1.5  # s, the window within which the root keeps to the track
+
+MOST_TURN_TO_BALL = np.radians(60.0)
+_REACHED = 0.25  # m between ball and part that the ball's noise and the limb make up for (`strike`)
+_BALL_TURN_SECONDS = 0.5  # before and after the key frame over which the turn grows and fades
+_NEAR, _CLEAR = 0.1, 0.35  # m from the hips: below the first a direction says nothing, above the second all
+
+GRAVITY = 9.81
+LEGS_LEAN, TRUNK_LEAN = 0.5, 0.2
+"""Share of a / g by which legs and trunk lean; recorded legs lean by 0.7 to 0.8 of it and the trunk by a quarter."""
+
+MOST_LEAN = 0.2  # rad that are added at most
+UPRIGHT_SPEED = (1.5, 3.0)  # m/s below which a body does not lean, and from which on all of it counts
+_LEAN_SECONDS = 0.6
+
+_FOOT_WEIGHT = 0.1  # weight of a standing foot's movement: with more, the pelvis surges and stops with every step
+_STIFF, _STAY = (2.0, 0.2), (0.02, 5e-4)
+"""Weights of the third difference and of the whole, for metres of the root and for radians of facing."""
+
+_ROOT_X, _ROOT_Y, _TURN, _UNKNOWNS = 0, 1, 2, 3
 
 
 def facing(
-    direction: np.ndarray,
-    speed: np.ndarray,
-    velocity: np.ndarray,
-    turn: np.ndarray,
-    kept: np.ndarray | None = None,
-    firm: np.ndarray | float = 1.0,
-    aim: np.ndarray | None = None,
+    direction: np.ndarray, speed: np.ndarray, velocity: np.ndarray, turn: np.ndarray, kept: np.ndarray | None = None,
+    firm: np.ndarray | float = 1.0, aim: np.ndarray | None = None,
 ) -> np.ndarray:
     """(T,) facing in radians, unwrapped: the least squares compromise between travel and the recording's own turning.
 
@@ -49,14 +67,12 @@ def facing(
     frame; turn (T,) radians the recording turned since the frame before. At speed the body keeps the recording's angle
     to the direction of travel; where either stands still there is no such angle and the recording's turning decides,
     with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the
-    facing has to be, NaN where it is free: what lies around a stretch that is made anew. firm (T,): how many times
-    firmer than usual the recording's own turning is followed (`firmness`). aim: (T,) radians that a body which stands
-    slowly turns to.
+    facing has to be, NaN where it is free: what lies around a stretch that is constructed again. firm (T,): how many
+    times firmer than usual the recording's own turning is followed (`turning_firmness`). aim: (T,) radians that a body
+    which stands slowly turns to.
     """
-    own_speed = np.linalg.norm(velocity, axis=1)
-    offset = arctan2(velocity[:, 1], velocity[:, 0])
-    goal = direction - offset
-    trust = _moving(speed) ** 2 * _moving(own_speed) ** 2
+    goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
+    trust = _moving(speed) ** 2 * _moving(np.linalg.norm(velocity, axis=1)) ** 2
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
     if kept is not None:
         goal, trust = np.where(np.isnan(kept), goal, kept), np.where(np.isnan(kept), trust, HOLD)
@@ -84,7 +100,7 @@ def follow_turning(
     return squares.solve()[:, 0]
 
 
-def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
+def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
     """(T,) `firm` of `facing`: OFF_THE_FEET where no foot stands for a while or the hips are low, else 1; standing
     (T, 2, 2) bool of heels and toes, height (T,) m of the root."""
     off = ~standing.any(axis=(1, 2))
@@ -96,7 +112,7 @@ def firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray
 
 
 def _moving(speed: np.ndarray) -> np.ndarray:
-    """(T,) 0 for those who stand, 1 from 1 m/s on: how far a velocity tells where its owner goes."""
+    """(T,) 0 for bodies that stand, 1 from 1 m/s on: how much a velocity says about where its body goes."""
     return np.clip((speed - STANDS) / (1.0 - STANDS), 0.0, 1.0)
 
 
@@ -131,3 +147,120 @@ def pulled_to_track(
     for _ in range(rounds):
         root = root - (zero_phase_hann(root, fps, window) - smooth)
     return root
+
+
+def turn_to_ball(
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, ball: np.ndarray, touches: Sequence[Touch], fps: float
+) -> np.ndarray:
+    """(T,) radians to turn the body by, about its root, at most MOST_TURN_TO_BALL at any touch.
+
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; ball (T, 3) m, NaN where there is none. Of two
+    parts that may strike, the faster one's place counts.
+    """
+    turn, at = np.zeros(len(root)), np.arange(len(root))
+    for touch in touches:
+        offset = _turn_at_touch(skeleton, root, rotations, ball, touch)
+        bump = np.clip(1.0 - np.abs(at - touch.frame) / (_BALL_TURN_SECONDS * fps), 0.0, 1.0)
+        grown = offset * bump**3 * (10.0 - 15.0 * bump + 6.0 * bump**2)
+        turn = np.where(np.abs(grown) > np.abs(turn), grown, turn)
+    return turn
+
+
+def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> float:
+    frame = int(np.clip(round(touch.frame), 1, len(root) - 2)) if len(root) > 2 else 0
+    found = [surface for surface in surfaces(skeleton, touch.words) if surface.part == "foot"]
+    if len(root) < 3 or not found or not np.isfinite(ball[frame]).all():
+        return 0.0
+    places, world = pose_kinematics(skeleton, root[frame - 1 : frame + 2], rotations[frame - 1 : frame + 2])
+    part, goal = faster_middle(found, places, world)[1, :2] - root[frame, :2], ball[frame, :2] - root[frame, :2]
+    clear = np.clip((min(np.linalg.norm(part), np.linalg.norm(goal)) - _NEAR) / (_CLEAR - _NEAR), 0.0, 1.0)
+    apart = np.arctan2(part[0] * goal[1] - part[1] * goal[0], part @ goal)
+    return float(clear * np.clip(_least_turn(part, goal, apart), -MOST_TURN_TO_BALL, MOST_TURN_TO_BALL))
+
+
+def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
+    """As much of the angle `apart` as brings a part (2,) within _REACHED of its goal (2,), all where none does."""
+    p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
+    free = np.arccos(np.clip((p * p + g * g - _REACHED**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
+    return float(np.sign(apart) * max(0.0, abs(apart) - free))
+
+
+def missing_lean(
+    speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float,
+    slow: tuple[float, float] = UPRIGHT_SPEED,
+) -> np.ndarray:
+    """(T,) a / g, to the left, that the track asks for beyond what the recording had; softly limited so that legs get
+    at most MOST_LEAN, and nothing below UPRIGHT_SPEED.
+
+    speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its
+    facing frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction
+    says nothing; slow: as UPRIGHT_SPEED.
+    """
+    own_speed = np.linalg.norm(velocity, axis=1)
+    own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
+    own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
+    asked = speed * quaternion.wrapped(np.diff(direction, prepend=direction[:1]))
+    fast = np.clip((np.minimum(speed, own_speed) - slow[0]) / (slow[1] - slow[0]), 0.0, 1.0)
+    turns = asked - own_speed * quaternion.wrapped(own_turn)
+    lean = zero_phase_hann((fast * np.clip(turns * fps / GRAVITY, -1.0, 1.0))[:, None], fps, _LEAN_SECONDS)[:, 0]
+    most = MOST_LEAN / LEGS_LEAN
+    return most * np.tanh(lean / most)
+
+
+def bend_forward(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Local rotations (T, J, 4) of a body whose trunk leans forward, in its direction of travel (T,), by angle (T,)."""
+    out, left = rotations.copy(), np.column_stack([-np.sin(direction), np.cos(direction), np.zeros(len(direction))])
+    _turn_trunk(skeleton, rotations, left, angle, out)
+    return out
+
+
+def lean_into_curves(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lean: np.ndarray) -> np.ndarray:
+    """Local rotations (T, J, 4) of a body that leans to the left of its direction of travel (T,) by lean (T,) as a / g.
+
+    The body turns about its root, legs and all, and the trunk turns back a part of the way above the hips.
+    """
+    out, axis = rotations.copy(), np.column_stack([np.cos(direction), np.sin(direction), np.zeros(len(direction))])
+    out[:, 0] = quaternion.multiply(quaternion.about_axis(axis, -LEGS_LEAN * lean), rotations[:, 0])
+    _turn_trunk(skeleton, rotations, axis, (LEGS_LEAN - TRUNK_LEAN) * lean, out)
+    return out
+
+
+def _turn_trunk(skeleton: Skeleton, rotations: np.ndarray, axis: np.ndarray, angle: np.ndarray, out: np.ndarray):
+    """Into `out`: the first joint of the spine turned about axes (T, 3) in the world by angle (T,)."""
+    spine = identify(skeleton).spine
+    if spine:
+        above = world_rotation(skeleton, rotations, skeleton.parents[spine[0]])
+        turn = quaternion.about_axis(quaternion.rotate(quaternion.inverse(above), axis), angle)
+        out[:, spine[0]] = quaternion.multiply(turn, rotations[:, spine[0]])
+
+
+
+def absorb_foot_slide(
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Metres (T, 2) by which the root moves on the ground, and radians (T,) by which the body turns about it.
+
+    root (T, 3) m and rotations (T, J, 4) local: the motion laid out; standing (T, 2, 2) bool: heels and toes. With f a
+    point that stands, a its arm from the root and J a quarter turn, minimizes sum _FOOT_WEIGHT w |r' + t' J a + f'|^2
+    + _STIFF |r''', t'''|^2 + _STAY |r, t|^2, differences per frame at 30 frames per second: one banded system. The legs
+    make up for the rest (`foot_plant`); what drifts away from the track is taken back by `pulled_to_track`.
+    """
+    body = identify(skeleton)
+    places, _ = pose_kinematics(skeleton, root, rotations)
+    count, scale = len(root), 30.0 / fps
+    squares = BandedLeastSquares(count, _UNKNOWNS)
+    for side, limb in enumerate((body.left, body.right)):
+        firm = firmness(standing[:, side])
+        for point, joint in enumerate((limb.foot, limb.toe_or_foot)):
+            place = places[:, joint, :2]
+            arm, moves = (place - root[:, :2])[:-1], np.diff(place, axis=0)
+            weight = _FOOT_WEIGHT * np.minimum(firm[1:, point], firm[:-1, point])
+            one = np.ones(len(weight))
+            for axis, swing in ((_ROOT_X, -arm[:, 1]), (_ROOT_Y, arm[:, 0])):
+                stencil = {axis: -one, _TURN: -swing, axis + _UNKNOWNS: one, _TURN + _UNKNOWNS: swing}
+                squares.add(stencil, weight, -moves[:, axis])
+    for axis, kind in ((_ROOT_X, 0), (_ROOT_Y, 0), (_TURN, 1)):
+        squares.add_difference(3, _STIFF[kind] / scale**4, axis)
+        squares.add_value(_STAY[kind] * scale**2, axis)
+    found = squares.solve()
+    return found[:, :2], found[:, _TURN]

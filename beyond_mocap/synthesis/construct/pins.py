@@ -3,8 +3,8 @@
 A limb comes to its pin and leaves it within FADE seconds: there it is off its own way by what it is off at the pin,
 fading away. At a pin that holds it comes to rest, at a momentary one it passes. It gets there by two-bone inverse
 kinematics (`limb`). Where the limb is too short, first the spine bends towards the pin and then the pelvis comes
-nearer, the feet held where they are; what still lacks is told. The gaze turns the head, with it the neck and a little
-the chest, as far as a neck can. Frames without a pin keep their bits.
+nearer, the feet held where they are; what still lacks is reported. The gaze turns the head, with it the neck and a
+little the chest, as far as a neck can. Frames without a pin keep their bits.
 """
 
 from __future__ import annotations
@@ -22,20 +22,12 @@ from ...motion.humanoid import Humanoid, heading_from_positions, identify
 from ...motion.limb import two_bone
 from ...motion.motion import Motion, pose_kinematics
 from ...motion.skeleton import Skeleton
-from .ball.carry import arm, leg
+from .carry import arm, joints_down, leg
 
-FADE = 0.3
-"""Seconds before and behind a pin in which the body comes to it and leaves it."""
-
-MOST_BEND, MOST_SHIFT = 0.6, 0.25
-"""Radians that the spine bends and metres that the pelvis moves at most for a pin out of reach."""
-
-MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)
-"""How far from straight ahead of the body a gaze turns at most."""
-
-STRETCH = 0.985
-"""Share of a limb's length up to which it reaches by itself."""
-
+FADE = 0.3  # s before and behind a pin in which the body comes to it and leaves it
+MOST_BEND, MOST_SHIFT = 0.6, 0.25  # rad that the spine bends and m that the pelvis moves for a pin out of reach
+MOST_YAW, MOST_PITCH = np.radians(100.0), np.radians(55.0)  # from straight ahead of the body that a gaze turns
+STRETCH = 0.985  # of a limb's length up to which it reaches by itself
 _SOFT, _SOFT_LACK = 0.004, 0.02  # m over which limbs ease at full length, and over which the body begins to go along
 _CHEST_SHARE, _NECK_SHARE = 0.15, 0.35  # of a look's turn; the head has the rest
 _GLIDE = 2.0  # frames in which a limb that leaves a pin takes up the body's speed
@@ -91,18 +83,15 @@ def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, l
     pins: anything with time and hold s, part and position m (`plan.Pin`), no two of a part at one time. contacts (T, 2)
     bool. look (3,): which way the head joint looks, in its own frame (`look_axis`).
     """
-    out = _Work(motion, np.array(contacts), look)
-    parts = {part: [n for n, pin in enumerate(pins) if pin.part == part] for part in ("left_foot", "right_foot")}
-    targets = {}
+    out, targets = _Work(motion, np.array(contacts), look), {}
     for part in dict.fromkeys(pin.part for pin in pins):
-        numbers = [n for n, pin in enumerate(pins) if pin.part == part]
-        targets[part] = target([pins[n] for n in numbers], start, motion.fps, len(motion))
+        targets[part] = target([pin for pin in pins if pin.part == part], start, motion.fps, len(motion))
     touched = np.zeros(len(motion), bool)
     for found in targets.values():
         touched |= found.share > 0.0
     for low, high in runs(touched):
         out.work(low, high, {part: found.cut(low, high) for part, found in targets.items()})
-    for part in parts:
+    for part in ("left_foot", "right_foot"):
         if part in targets:
             out.lift(part, targets[part])
     return Pinned(out.root, out.rotations, out.contacts, tuple(out.miss(pin, start) for pin in pins))
@@ -150,8 +139,7 @@ class _Work:
     """A motion on its way to its pins."""
 
     def __init__(self, motion: Motion, contacts: np.ndarray, look: np.ndarray):
-        self.skeleton, self.look, self.contacts = motion.skeleton, look, contacts
-        self.before = motion
+        self.skeleton, self.look, self.contacts, self.before = motion.skeleton, look, contacts, motion
         self.root, self.rotations = np.array(motion.root_positions), np.array(motion.rotations)
         self.body = identify(motion.skeleton)
 
@@ -184,9 +172,8 @@ class _Work:
         if "gaze" in targets:
             part.gaze(targets["gaze"], self.look, whole=False)
         self.root[low:high] = part.root
-        self.rotations[low:high] = quaternion.normalized(
-            quaternion.signed_like(part.rotations, self.rotations[low:high])
-        )
+        signed = quaternion.signed_like(part.rotations, self.rotations[low:high])
+        self.rotations[low:high] = quaternion.normalized(signed)
 
     def lift(self, part: str, found: Target) -> None:
         """A foot on its way to or from a pin does not stand."""
@@ -215,14 +202,12 @@ class _Work:
             lines = [np.interp(inside, at, column) for column in away.T]
             return float(np.linalg.norm(lines, axis=0).max())
         sight = quaternion.rotate(world[:, chain[-1]], np.broadcast_to(self.look, away.shape))
-        return float(np.arccos(np.clip(_dot(sight, away) / np.linalg.norm(away, axis=1), -1.0, 1.0)).max())
+        return float(np.arccos(np.clip(np.sum(sight * away, axis=-1) / np.linalg.norm(away, axis=1), -1.0, 1.0)).max())
 
 
 def _chains(body: Humanoid) -> dict[str, tuple]:
-    return {
-        "left_foot": leg(body.left), "right_foot": leg(body.right),
-        "left_hand": arm(body.left), "right_hand": arm(body.right),
-    }
+    return {"left_foot": leg(body.left), "right_foot": leg(body.right),
+            "left_hand": arm(body.left), "right_hand": arm(body.right)}
 
 
 class _Part:
@@ -232,9 +217,9 @@ class _Part:
     def __init__(self, skeleton: Skeleton, body: Humanoid, root: np.ndarray, rotations: np.ndarray):
         self.skeleton, self.body = skeleton, body
         self.root, self.rotations = root.copy(), rotations.copy()
-        self._posed()
+        self._pose()
 
-    def _posed(self) -> None:
+    def _pose(self) -> None:
         self.places, self.world = pose_kinematics(self.skeleton, self.root, self.rotations)
 
     def goal(self, joint: int, found: Target) -> np.ndarray:
@@ -244,10 +229,8 @@ class _Part:
         for stay in found.stays:
             low, high = stay.frames[0], min(stay.frames[1], len(own) - 1)
             inside = slice(low, high + 1)
-            if stay.last > stay.first:
-                off[inside] = stay.place - own[inside]
-            else:
-                off[inside] = stay.place - [np.interp(stay.first, at, column) for column in own.T]
+            passed = own[inside] if stay.last > stay.first else [np.interp(stay.first, at, column) for column in own.T]
+            off[inside] = stay.place - passed
             known.append((low, high, stay.last > stay.first))
         for (_, high, held), (low, _, holds) in zip([(0, -1, False), *known], [*known, (len(own), 0, False)]):
             gap = np.arange(high + 1, low)
@@ -273,14 +256,13 @@ class _Part:
     def come_nearer(self, chain, goal: np.ndarray, share: np.ndarray, bend: bool) -> None:
         """Bends the spine (for a hand) and moves the pelvis so far that the limb, which is `share` (W,) on its way,
         reaches its goal (W, 3)."""
-        reach = STRETCH * sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in _bones(self.skeleton, chain))
-        spine = [joint for joint in self.body.spine] if bend else []
+        reach, spine = STRETCH * self._length(chain), self.body.spine if bend else ()
         for _ in range(3 if spine else 0):
             self._bend(spine, chain[0], goal, reach, share / 3.0)
         lack, way = self._lack(chain[0], goal, reach)
         shift = (share * np.minimum(lack, MOST_SHIFT))[:, None] * way
         self.root = self.root + np.column_stack([shift[:, :2], np.minimum(shift[:, 2], 0.0)])
-        self._posed()
+        self._pose()
 
     def settle(self, root: np.ndarray, chains: dict, soles: dict, contacts: np.ndarray, fps: float) -> None:
         """Lowers a pelvis that has been moved away from `root` (W, 3) so far that a foot which stands, contacts (W, 2),
@@ -292,16 +274,19 @@ class _Part:
         for side, name in enumerate(("left_foot", "right_foot")):
             stands = np.convolve(np.pad(contacts[:, side].astype(float), len(window) // 2, mode="edge"), window, "same")
             stands = stands[len(window) // 2 : len(window) // 2 + len(root)] / window.sum()
-            chain = chains[name]
-            hip = self.places[:, chain[0]]
-            bones = sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in _bones(self.skeleton, chain))
+            hip, bones = self.places[:, chains[name][0]], self._length(chains[name])
             own = np.linalg.norm(hip + root - self.root - soles[name], axis=1)
             longest = np.maximum(STRETCH * bones, np.minimum(own, bones))
             aside = np.linalg.norm((hip - soles[name])[:, :2], axis=1)
             highest = soles[name][:, 2] + np.sqrt(np.maximum(longest**2 - aside**2, 0.0))
             drop = np.maximum(drop, np.clip(hip[:, 2] - highest, 0.0, MOST_SHIFT) * stands)
         self.root = self.root - drop[:, None] * [0.0, 0.0, 1.0]
-        self._posed()
+        self._pose()
+
+    def _length(self, chain) -> float:
+        """Metres of a limb, stretched."""
+        bones = joints_down(self.skeleton, chain[0], chain[-1])[:0:-1]
+        return float(sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in bones))
 
     def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
         """(W,) m that `joint` is too far from the goal, setting in softly, and (W, 3) the way there."""
@@ -309,7 +294,7 @@ class _Part:
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         return _SOFT_LACK * np.logaddexp(0.0, (distance - reach) / _SOFT_LACK), away / distance[:, None]
 
-    def _bend(self, spine: list[int], top: int, goal: np.ndarray, reach, share: np.ndarray) -> None:
+    def _bend(self, spine: tuple[int, ...], top: int, goal: np.ndarray, reach, share: np.ndarray) -> None:
         """Turns the joints of the spine evenly so that `top` comes nearer to the goal by what it lacks."""
         lack, way = self._lack(top, goal, reach)
         low = self.places[:, spine[0]]
@@ -326,23 +311,21 @@ class _Part:
         parent = self.skeleton.parents[joint]
         above = self.world[:, parent] if parent >= 0 else quaternion.identity(len(world))
         self.rotations[:, joint] = quaternion.multiply(quaternion.inverse(above), world)
-        self._posed()
+        self._pose()
 
     def reach(self, chain, goal: np.ndarray, share: np.ndarray, turn: np.ndarray | None = None) -> None:
         """Brings a limb's end to its goal (W, 3), and to the rotation `turn` (W, 4) in the world where that is given;
         where the share (W,) is small, its joints go over from their own rotations."""
         if not np.any(share > 0.0):
             return
-        found = two_bone(
-            self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
-            keep_end_rotation=False, soft=_SOFT,
-        ).rotations
+        found = two_bone(self.skeleton, self.root, self.rotations, chain, goal, end_rotation=turn,
+                         keep_end_rotation=False, soft=_SOFT).rotations
         weight = smoothstep(4.0 * share)
-        for joint in {*_bones(self.skeleton, chain), chain[0]}:
+        for joint in joints_down(self.skeleton, chain[0], chain[-1]):
             near = quaternion.signed_like(found[:, joint], self.rotations[:, joint])
             mixed = quaternion.slerp(self.rotations[:, joint], near, weight)
             self.rotations[:, joint] = np.where(weight[:, None] >= 1.0, near, mixed)
-        self._posed()
+        self._pose()
 
     def gaze(self, found: Target, look: np.ndarray, whole: bool) -> None:
         """Turns the head so that it looks at the place, with the neck and the chest where the whole body is meant."""
@@ -365,16 +348,3 @@ class _Part:
         pitch = np.clip(arctan2(away[:, 2], np.hypot(away[:, 0], away[:, 1])), -MOST_PITCH, MOST_PITCH)
         wanted = np.column_stack([np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)])
         return quaternion.to_rotation_vector(quaternion.between(sight, wanted))
-
-
-def _bones(skeleton: Skeleton, chain) -> list[int]:
-    """The joints of a limb below its upper one, down to its end."""
-    found, joint = [], chain[-1]
-    while joint != chain[0]:
-        found.append(joint)
-        joint = skeleton.parents[joint]
-    return found
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.sum(a * b, axis=-1)

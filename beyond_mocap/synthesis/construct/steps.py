@@ -1,12 +1,11 @@
-"""Small extra steps: a foot that would be dragged along while it stands is lifted and set down anew instead.
+"""Small extra steps: a foot that would be dragged along while it stands is lifted and set down elsewhere instead.
 
-No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball.
-Laid on such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further
-after a body on rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for
-some tenths of a second while the other one stands, and `foot_plant` sets it down where the body will be in the
-middle of the stance that follows. Left and right take turns, since each step resets what its foot lags behind. Where
-nothing drags nothing is done. Where the other foot is in the air for too long to step, and only gently so, its own
-lift is left out: it stays down, and steps when it is due.
+No player stands as still as a recording of standing: tracked ones creep at 0.1 to 0.5 m/s and turn after the ball. Laid
+on such a track, feet that stand would slide or turn on the spot, or the legs would lean further and further after a
+body on rails. Where that is more than STRIDE or TURN allow, the stance is broken: the foot is lifted for some tenths of
+a second while the other one stands, and `foot_plant` sets it down where the body will be in the middle of the stance
+that follows. Left and right take turns, since each step resets what its foot lags behind. Where the other foot is in
+the air for too long to step, and only gently so, its own lift is left out: it stays down, and steps when it is due.
 """
 
 from __future__ import annotations
@@ -25,6 +24,7 @@ from ...motion.limb import two_bone
 from ...motion.motion import pose_kinematics
 from ...motion.skeleton import Skeleton
 from ...motion.track import zero_phase_hann
+from .carry import leg
 
 SPEED = np.array([0.05, 0.3, 0.8, 1.5])
 STRIDE = np.array([0.12, 0.25, 0.40, 0.45])
@@ -33,45 +33,21 @@ SWING = np.array([0.45, 0.38, 0.32, 0.30])
 """By the body's speed in m/s: metres that a foot is dragged, and radians that it is turned, from the beginning of a
 stance to its end before a step is taken, and the step's seconds. At 0.3 m/s that makes 1.5 steps a second."""
 
-SPARED = 1.15
-"""Times STRIDE and TURN that a stance is let drag before it is broken."""
-
-LEAST_SWING = 0.26
-"""Seconds of the quickest step, where there is no time for more."""
-
-HEEL_OFF, TOE_ON = 0.06, 0.03
-"""Seconds of a step in which the heel leaves the ground before the toe, and in which the toe is down again."""
-
-LATE = 1.3
-"""Times STRIDE and TURN that a foot may lag before a lift of the other one is left out so that it can step sooner."""
-
-CLEARLY = 0.3
-"""By how much one of two feet has to lag more to go first."""
-
-SETTLED = 0.04
-"""Seconds that a foot stands at least before the other one is lifted, and after it is down again."""
-
-SHORTEST = 0.2
-"""Seconds that are left of a stance at least on either side of a step."""
-
-APART = 0.11
-"""Metres between the ankles that feet on their way past each other keep."""
-
-LIFT = 0.045
-"""Metres that a foot is lifted."""
-
-HEEL_UP, TOE_UP = 0.22, 0.06
-"""Radians: heel over toe after lifting, toe over heel before landing."""
-
-SWAY = 0.012
-"""Metres that the pelvis goes over to the foot that stands."""
-
+SPARED = 1.15  # times STRIDE and TURN that a stance may drag before it is broken
+LATE = 1.3  # times them that a foot may lag before a lift of the other one is left out so that it can step sooner
+CLEARLY = 0.3  # by how much one of two feet has to lag more to go first
+LEAST_SWING = 0.26  # s of the quickest step, where there is no time for more
+HEEL_OFF, TOE_ON = 0.06, 0.03  # s of a step in which the heel is off before the toe, and the toe is down again
+SETTLED = 0.04  # s that a foot stands at least before the other one is lifted, and after it is down again
+SHORTEST = 0.2  # s that are left of a stance at least on either side of a step
+APART = 0.11  # m between the ankles that feet on their way past each other keep
+LIFT = 0.045  # m that a foot is lifted
+HEEL_UP, TOE_UP = 0.22, 0.06  # rad: heel over toe after lifting, toe over heel before landing
+SWAY = 0.012  # m that the pelvis goes over to the foot that stands
 GENTLE_SPEED, GENTLE_HEIGHT, GENTLE_SECONDS = 0.6, 0.20, 1.5
 """m/s of the body up to which a lift may be left out, metres that the ankle rises in it, and its seconds."""
 
-UPRIGHT = 0.75
-"""Of the usual height of the root: who is lower crouches, kneels or lies, and takes no steps."""
-
+UPRIGHT = 0.75  # of the usual height of the root: a lower body crouches, kneels or lies, and takes no steps
 _LEFT, _RIGHT, _ROUNDS = 0, 1, 6
 
 
@@ -92,20 +68,14 @@ class Steps:
     @staticmethod
     def none(rotations: np.ndarray, standing: np.ndarray) -> Steps:
         """No steps at all; rotations (T, J, 4), standing (T, 2, 2) bool."""
-        count = len(standing)
-        nothing = np.zeros((count, 2))
-        return Steps(rotations=rotations, standing=standing, contacts=standing.all(axis=2),
-                     stepped=nothing.astype(bool), moves=np.zeros((count, 2, 4)), sway=nothing)
+        nothing = np.zeros((len(standing), 2))
+        return Steps(rotations=rotations, standing=standing, contacts=standing.all(axis=2), sway=nothing,
+                     stepped=nothing.astype(bool), moves=np.zeros((len(standing), 2, 4)))
 
 
 def steps(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    fps: float,
-    given: np.ndarray | None = None,
-    free: np.ndarray | None = None,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
+    given: np.ndarray | None = None, free: np.ndarray | None = None,
 ) -> Steps:
     """The extra steps of a motion laid out on the ground.
 
@@ -118,17 +88,14 @@ def steps(
     body = identify(skeleton)
     places, world = pose_kinematics(skeleton, root, rotations)
     heading = np.unwrap(quaternion.yaw(rotations[:, 0]))
-    limbs = (body.left, body.right)
-    feet = [_Foot(
-        limb, places, world, root=root, heading=heading, standing=standing[:, side],
-    ) for side, limb in enumerate(limbs)]
+    feet = [_Foot(limb, places, world, root=root, heading=heading, standing=standing[:, side])
+            for side, limb in enumerate((body.left, body.right))]
     upright = root[:, 2] > UPRIGHT * np.median(root[:, 2])
     speed = np.linalg.norm(np.gradient(zero_phase_hann(root[:, :2], fps, 1.0), axis=0), axis=1) * fps
     stepped = none.stepped if given is None else given
     plan = _Plan(feet, stepped, speed, fps, upright if free is None else free & upright)
     plan.run()
-    feet = plan.feet
-    for foot in feet:
+    for foot in (feet := plan.feet):
         rotations = foot.held_down(skeleton, root, rotations)
     stands = np.stack([standing[:, side] | foot.held[:, None] for side, foot in enumerate(feet)], axis=1)
     stepped = stepped | plan.stepped
@@ -156,8 +123,8 @@ class _Foot:
         along = toe - self.places if limb.toe is not None else quaternion.rotate(self.world, np.array([1.0, 0.0, 0.0]))
         self.yaw = np.unwrap(arctan2(along[:, 1], along[:, 0]))
         self.stands, self.flat = standing.any(axis=1), standing.all(axis=1)
-        self.held = np.zeros(len(root), bool)
-        self.before, self.behind, self.through = np.zeros(len(root), int), np.zeros(len(root), int), np.zeros(len(root))
+        self.held, self.through = np.zeros(len(root), bool), np.zeros(len(root))
+        self.before, self.behind = np.zeros(len(root), int), np.zeros(len(root), int)
         self.heading, self.root = heading, root[:, 0] + 1j * root[:, 1]
         self.points = np.stack([self.places[:, 0] + 1j * self.places[:, 1], toe[:, 0] + 1j * toe[:, 1]], axis=1)
         self.middle = self.points.mean(axis=1)
@@ -184,17 +151,15 @@ class _Foot:
 
     def _between(self, points: np.ndarray, at) -> np.ndarray:
         """Held places (N, K) at frames `at`: straight from the one to the other as the body sees it."""
-        own = [
-            (points[edge[at]] - self.root[edge[at], None]) * np.exp(-1j * self.heading[edge[at], None])
-            for edge in (self.before, self.behind)
-        ]
+        own = [(points[edge[at]] - self.root[edge[at], None]) * np.exp(-1j * self.heading[edge[at], None])
+               for edge in (self.before, self.behind)]
         way = own[0] + self.through[at, None] * (own[1] - own[0])
         return way * np.exp(1j * self.heading[at, None]) + self.root[at, None]
 
     def _flat_before(self, first: int, reach: int) -> int:
         low = max(first - reach, 0)
         stands = self.stands[low:first] & ~self.held[low:first]
-        low += int(np.flatnonzero(~stands)[-1]) + 1 if not stands.all() else 0
+        low += max(np.flatnonzero(~stands).tolist(), default=-1) + 1
         flat = np.flatnonzero(self.flat[low:first])
         return low + int(flat[-1]) + 1 if len(flat) else first
 
@@ -209,23 +174,19 @@ class _Foot:
         at = np.flatnonzero(self.held)
         if not len(at):
             return rotations
-        height = [self.places[edge[at], 2] for edge in (self.before, self.behind)]
+        height = [self.places[edge, 2] for edge in (self.before[at], self.behind[at])]
         level = self.points[at, 0]
         target = np.stack([level.real, level.imag, height[0] + self.through[at] * (height[1] - height[0])], axis=1)
-        turn = [
-            quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge[at]]), self.world[edge[at]])
-            for edge in (self.before, self.behind)
-        ]
+        turn = [quaternion.multiply(quaternion.about_up(self.heading[at] - self.heading[edge]), self.world[edge])
+                for edge in (self.before[at], self.behind[at])]
         turned = quaternion.slerp(turn[0], turn[1], self.through[at])
-        chain = (self.limb.upper_leg, self.limb.lower_leg, self.limb.foot)
         out = rotations.copy()
-        out[at] = two_bone(skeleton, root[at], rotations[at], chain, target, end_rotation=turned).rotations
+        out[at] = two_bone(skeleton, root[at], rotations[at], leg(self.limb), target, end_rotation=turned).rotations
         return quaternion.continuous(out)
 
 
 class _Plan:
-    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are what has come
-    of it."""
+    """Steps chosen one after the other, always the earliest: `feet`, `stands` and `stepped` (T, 2) are the result."""
 
     def __init__(self, feet: list[_Foot], given: np.ndarray, speed: np.ndarray, fps: float, free: np.ndarray):
         self.feet, self.speed, self.fps = feet, speed, fps
@@ -233,9 +194,8 @@ class _Plan:
         self.stepped, self.lag = np.zeros_like(self.stands), np.zeros(self.stands.shape)
         self.free_until = _until(free)
         self.swing = np.maximum(np.rint(np.interp(speed, SPEED, SWING) * fps).astype(int), 3)
-        self.settled, self.shortest, self.least = (
-            max(1, int(round(seconds * fps))) for seconds in (SETTLED, SHORTEST, LEAST_SWING)
-        )
+        least = (max(1, int(round(seconds * fps))) for seconds in (SETTLED, SHORTEST, LEAST_SWING))
+        self.settled, self.shortest, self.least = least
         self.turn = np.interp(speed, SPEED, TURN)
         self.stride = np.minimum(np.interp(speed, SPEED, STRIDE), self._room())
         self.last: int | None = None
@@ -253,10 +213,8 @@ class _Plan:
         return np.where(across > APART, np.inf, np.maximum(room, STRIDE[0]))
 
     def _dragged(self, side: int, now: int) -> list[tuple[int, int]]:
-        """Stances (first, end) from `now` on that drag too far, the first one first; notes how far each frame's foot
-        lags."""
-        ahead = [run for run in runs(self.stands[:, side]) if run[1] > now]
-        return [run for run in ahead if self._drag(side, *run) > SPARED]
+        """Stances (first, end) from `now` on that drag too far, the first one first; notes each frame's lag."""
+        return [run for run in runs(self.stands[:, side]) if run[1] > now and self._drag(side, *run) > SPARED]
 
     def _drag(self, side: int, first: int, end: int) -> float:
         """How far the foot would lag at most in frames first .. end, 1 where a step is due."""
@@ -323,18 +281,15 @@ class _Plan:
 
     def _look_again(self, side: int, at: int) -> None:
         """Finds out whether the stance around frame `at` drags too far."""
-        first = int(np.flatnonzero(~self.stands[:at, side])[-1]) + 1 if not self.stands[:at, side].all() else 0
+        first = max(np.flatnonzero(~self.stands[:at, side]).tolist(), default=-1) + 1
         end = int(_until(self.stands[:, side])[at])
         left = [run for run in self.left[side] if run[1] <= first or run[0] >= end]
         self.left[side] = sorted([*left, (first, end)] if self._drag(side, first, end) > SPARED else left)
 
     def _gentle(self, foot: _Foot, up: int, down: int) -> bool:
         height, ends = foot.places[up:down, 2], foot.places[[up - 1, min(down, len(self.speed) - 1)], 2]
-        return bool(
-            down - up <= GENTLE_SECONDS * self.fps
-            and self.speed[up:down].max() < GENTLE_SPEED
-            and height.max() - ends.min() < GENTLE_HEIGHT
-        )
+        slow = down - up <= GENTLE_SECONDS * self.fps and self.speed[up:down].max() < GENTLE_SPEED
+        return bool(slow and height.max() - ends.min() < GENTLE_HEIGHT)
 
     def _behind(self, side: int, at: int) -> float:
         """How far the foot is behind the other as the body goes."""
@@ -343,8 +298,7 @@ class _Plan:
         return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
 
     def _next(self, side: int, now: int) -> tuple[int, int] | None:
-        """Frames in which the foot's next dragged stance is to be broken, and in which it stands again; None where
-        there is none or it cannot be."""
+        """Frames in which the foot's next dragged stance is to be broken and in which it stands again, or None."""
         if not self.left[side]:
             return None
         first, end = self.left[side][0]
@@ -362,8 +316,7 @@ class _Plan:
         return first + at, int(down[at])
 
     def _down(self, side: int, first: int, end: int, now: int) -> np.ndarray:
-        """(end - first,) frame in which a step that begins there would have to be over: the other foot stands firmly
-        as long."""
+        """(end - first,) frame by which a step that begins there has to be over, since the other foot stands firmly."""
         at = np.arange(first, end)
         other = self.stands[:, 1 - side]
         until = _until(other)[at]
@@ -376,9 +329,8 @@ class _Plan:
 
 def _until(flags: np.ndarray) -> np.ndarray:
     """(T + 1,) the first frame from each on in which `flags` (T,) is not set."""
-    count = len(flags)
-    unset = np.where(flags, count, np.arange(count))
-    return np.append(np.minimum.accumulate(unset[::-1])[::-1], count)
+    unset = np.where(flags, len(flags), np.arange(len(flags)))
+    return np.append(np.minimum.accumulate(unset[::-1])[::-1], len(flags))
 
 
 def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
@@ -390,12 +342,9 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     loose = [[bool(near[a, side] or near[b + 1, side]) for a, b in stances[side]] for side in (_LEFT, _RIGHT)]
     place = [[foot.points[a:b].mean(axis=0) for a, b in stances[side]] for side, foot in enumerate(plan.feet)]
     pushed = [[0.0j] * len(side) for side in place]
-    pairs = [
-        (i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
-        for i, (a, b) in enumerate(stances[_LEFT])
-        for j, (c, d) in enumerate(stances[_RIGHT])
-        if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])
-    ]
+    pairs = [(i, j, complex(left[(max(a, c) + min(b, d)) // 2]))
+             for i, (a, b) in enumerate(stances[_LEFT]) for j, (c, d) in enumerate(stances[_RIGHT])
+             if max(a, c) <= min(b, d) and (loose[_LEFT][i] or loose[_RIGHT][j])]
     for _ in range(_ROUNDS):
         for i, j, way in pairs:
             between = place[_LEFT][i] - place[_RIGHT][j] + pushed[_LEFT][i] - pushed[_RIGHT][j]
@@ -424,8 +373,8 @@ def _swings(stepped: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _shape(stepped: np.ndarray, swings: np.ndarray, root: np.ndarray, feet: list[np.ndarray], fps: float):
-    """How steps taken while `stepped` (T, 2) look, whose toes are up in `swings` (T, 2): `moves` and `sway` of
-    Steps; root and both feet (T,) m, complex."""
+    """`moves` and `sway` of Steps taken while `stepped` (T, 2) with toes up in `swings` (T, 2); root and feet (T,) m,
+    complex."""
     moves, sway = np.zeros((len(stepped), 2, 4)), np.zeros((len(stepped), 2))
     early = int(0.2 * fps)
     for side in (_LEFT, _RIGHT):

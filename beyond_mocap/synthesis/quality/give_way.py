@@ -1,9 +1,8 @@
-"""What gave way in a take, and at which seconds: the lines that `warnings` tells (../shared/metrics.md, "Where they
+"""What gave way in a take, and at which seconds: the lines that `warnings` reports (../shared/metrics.md, "Where they
 cannot all hold": seconds, seam jerk, warp rate, skate, root error, key time, words, bones and ground).
 
 Every line is about one kind of thing and names its stretches. It is read off what was played, without the library's own
-figures, so that it costs a synthesis a few milliseconds; jolts at seams need those and are told by `jolts`, with the
-report.
+figures, so that it costs a synthesis a few milliseconds; jolts need those and come from `jolts`, with the report.
 """
 
 from __future__ import annotations
@@ -19,10 +18,9 @@ from ...library.landings import LANDING_FOLDER
 from ...library.library import Library
 from ...library.made import BLENDED, KICKED, MADE_FOLDER, TAKEN
 from ...motion.track import Track
-from . import feet, jerk, root
+from . import movement
 from .moments import Moment, met, moments
-from .pieces import played_rate, seams
-from .played import Played
+from .played import Played, find_transitions, played_rate
 from .targets import KEY_TARGETS, TARGETS
 
 REACH = (TARGETS["warp_rate.min"].least, TARGETS["warp_rate.max"].most)
@@ -37,29 +35,22 @@ _TOLERANCE = 1e-3
 
 
 def give_way(
-    played: Played,
-    *,
-    track: Track | None = None,
-    timeline: Timeline | None = None,
-    library: Library | None = None,
-    ik_miss: np.ndarray | None = None,
-    asked: Timeline | None = None,
+    played: Played, *, track: Track | None = None, timeline: Timeline | None = None, library: Library | None = None,
+    ik_miss: np.ndarray | None = None, asked: Timeline | None = None,
 ) -> list[TimedLine]:
     """A line for each kind of thing that gave way in what was played, with its seconds on the track's clock.
 
     track: the player's samples as measured; timeline: what was asked, for the key moments; library: what it was made
     from, without made clips; ik_miss (T, 2) m: how far each leg was short of where its foot should stand; asked: the
-    user's own words, where `timeline` has automatic ones beside them. What is not known is not told.
+    user's own words, where `timeline` has automatic ones beside them. What is not known is not reported.
     """
     stride = played.stride(library)
     source = played.clip, played.mirrored, played.clip_frame, stride
-    starts = seams(*source)
     keys = moments(played, timeline.keys, stride, library) if timeline is not None else []
     lines = [
         *_made_lines(played),
-        _made_landing(played),
         _too_fast(played, track, library),
-        _warped(played, source, starts),
+        _warped(played, source),
         _sliding(played),
         _short_legs(played, ik_miss),
         _off_track(played, track),
@@ -73,18 +64,13 @@ def give_way(
 
 def jolts(times: np.ndarray, starts: np.ndarray, ratios: np.ndarray) -> TimedLine | None:
     """Seams that are harder than recordings are: times (T,) s, starts (S,) frames of seams, ratios (S,) of
-    `jerk.seam_ratios`; None where there is none."""
-    most = TARGETS["seam_jerk_ratio.max"].most
+    `movement.seam_ratios`; None where there is none."""
+    most, flags = TARGETS["seam_jerk_ratio.max"].most, np.zeros(len(times), bool)
     hard = ratios > most
-    if not np.any(hard):
-        return None
-    flags = np.zeros(len(times), bool)
     for start in starts[hard]:
-        flags[max(start - jerk.REACH // 2, 0) : start + jerk.REACH // 2] = True
-    hardest = ratios[hard].max()
-    return _line(
-        times, flags, f"cuts jolt up to {hardest:.2f} times as hard as recordings of that speed ({most:g} wanted)"
-    )
+        flags[max(start - movement.JERK_REACH // 2, 0) : start + movement.JERK_REACH // 2] = True
+    hardest = f"{ratios.max(where=hard, initial=0.0):.2f} times as hard as recordings of that speed"
+    return _line(times, flags, f"cuts jolt up to {hardest} ({most:g} wanted)")
 
 
 def stretches(times: np.ndarray, flags: np.ndarray) -> str:
@@ -97,8 +83,11 @@ def stretches(times: np.ndarray, flags: np.ndarray) -> str:
     return f"{named} s" + (f" and {left} shorter" if left else "")
 
 
-def _line(times: np.ndarray, flags: np.ndarray, what: str, more: str = "") -> TimedLine:
-    """The line "4.2-6.0 s: what", with the stretches in which flags (T,) hold; `more` stands before the colon."""
+def _line(times: np.ndarray, flags: np.ndarray, what: str, more: str = "") -> TimedLine | None:
+    """The line "4.2-6.0 s: what", with the stretches in which flags (T,) hold, None where they never do; `more` stands
+    before the colon."""
+    if not np.any(flags):
+        return None
     return TimedLine(f"{stretches(times, flags)}{more}: {what}", *zip(*_joined(times, flags)))
 
 
@@ -114,67 +103,44 @@ def _span(first: float, last: float) -> str:
     return low if low == high else f"{low}-{high}"
 
 
-def _made(played: Played) -> np.ndarray:
-    """(T,) bool: frames of made clips."""
-    return _whose(played, MADE_FOLDER)
-
-
 def _whose(played: Played, *begins: str) -> np.ndarray:
     """(T,) bool: frames of clips whose path begins with one of `begins`."""
     table = np.array([path.startswith(begins) for path in played.clips] + [False])
     return table[played.clip]
 
 
-def _made_lines(played: Played) -> list[TimedLine]:
-    """A line per kind of made clip: running, two recordings blended, kicks, taken balls."""
+def _made_lines(played: Played) -> list[TimedLine | None]:
+    """A line per kind of made clip: running, two recordings blended, kicks, taken balls, landings."""
     blends, kicks, takes = (_whose(played, MADE_FOLDER + name) for name in (BLENDED, KICKED, TAKEN))
+    running = _whose(played, MADE_FOLDER) & ~blends & ~kicks & ~takes
     kinds = (
-        (
-            _made(played) & ~blends & ~kicks & ~takes,
-            "made running, since no recording has the speed that the track asks for",
-        ),
+        (running, "made running, since no recording has the speed that the track asks for"),
         (blends, "blended from a slower and a faster recording, since none has the speed that the track asks for"),
         (kicks, "a kick made on the run, since no recorded one is as fast as the player"),
         (takes, "a ball taken on the run, made, since nobody recorded takes one as fast as the player goes"),
+        (_whose(played, LANDING_FOLDER), "made landing and getting up, since the recording ends in flight"),
     )
-    return [
-        _line(played.times, there, what, _in_all(played, there))
-        for there, what in kinds
-        if np.any(there)
-    ]
-
-
-def _in_all(played: Played, there: np.ndarray) -> str:
-    """How long flags (T,) hold, as text."""
-    return f" ({np.sum(there) / played.motion.fps:.1f} s in all)"
-
-
-def _made_landing(played: Played) -> TimedLine | None:
-    made = _whose(played, LANDING_FOLDER)
-    if not np.any(made):
-        return None
-    what = "made landing and getting up, since the recording ends in flight"
-    return _line(played.times, made, what, _in_all(played, made))
+    return [_line(played.times, there, what, f" ({np.sum(there) / played.motion.fps:.1f} s in all)")
+            for there, what in kinds]
 
 
 def _too_fast(played: Played, track: Track | None, library: Library | None) -> TimedLine | None:
     """Recordings stretched to a speed that they have not, even within the limit of the warp."""
     if track is None or library is None:
         return None
-    speed = root.travel_speed(root.track_at(track, played.times), played.motion.fps)
-    fast = (speed > library.fastest * REACH[1]) & ~_made(played)
-    if not np.any(fast):
-        return None
+    speed = movement.travel_speed(movement.track_at(track, played.times), played.motion.fps)
+    fast = (speed > library.fastest * REACH[1]) & ~_whose(played, MADE_FOLDER)
+    most = speed.max(where=fast, initial=0.0)
     return _line(
         played.times, fast,
-        f"the track asks for up to {speed[fast].max():.1f} m/s, faster than the library's {library.fastest:.1f} m/s x "
+        f"the track asks for up to {most:.1f} m/s, faster than the library's {library.fastest:.1f} m/s x "
         f"{REACH[1]:g}: strides are stretched",
     )  # fmt: skip
 
 
-def _warped(played: Played, source, starts: np.ndarray) -> TimedLine | None:
+def _warped(played: Played, source) -> TimedLine | None:
     rate = played_rate(*source)
-    rate[starts - 1] = np.nan
+    rate[find_transitions(*source) - 1] = np.nan
     beyond = np.append((rate < REACH[0] - _TOLERANCE) | (rate > REACH[1] + _TOLERANCE), False)
     if not np.any(beyond):
         return None
@@ -187,33 +153,27 @@ def _warped(played: Played, source, starts: np.ndarray) -> TimedLine | None:
 
 def _sliding(played: Played) -> TimedLine | None:
     """Stances whose toe travels farther than eyes overlook."""
-    stances = feet.stances(played.contacts)
-    travel = feet.stance_travel(played.feet[:, :, 1], stances)
+    stances = movement.stances(played.contacts)
+    travel = movement.stance_travel(played.feet[:, :, 1], stances)
     flags = np.zeros(len(played.motion), bool)
-    for first, end, _ in stances[travel > feet.NOTICED_SLIDE]:
+    for first, end, _ in stances[travel > movement.NOTICED_SLIDE]:
         flags[first:end] = True
-    if not np.any(flags):
-        return None
-    return _line(played.times, flags, f"a standing foot slides, by up to {100 * travel.max():.0f} cm")
+    return _line(played.times, flags, f"a standing foot slides, by up to {100 * travel.max(initial=0.0):.0f} cm")
 
 
 def _short_legs(played: Played, ik_miss: np.ndarray | None) -> TimedLine | None:
     if ik_miss is None:
         return None
     miss = np.asarray(ik_miss).reshape(len(played.motion), -1).max(axis=1)
-    if not np.any(miss > SHORT_LEG):
-        return None
-    what = f"a leg cannot reach where its foot should stand and ends up to {100 * miss.max():.1f} cm short"
+    what = f"a leg cannot reach where its foot should stand and ends up to {100 * miss.max(initial=0.0):.1f} cm short"
     return _line(played.times, miss > SHORT_LEG, what)
 
 
 def _off_track(played: Played, track: Track | None) -> TimedLine | None:
     if track is None:
         return None
-    error = root.root_error(played.pelvis, root.track_at(track, played.times), played.motion.fps)
-    if not np.any(error > OFF_TRACK):
-        return None
-    return _line(played.times, error > OFF_TRACK, f"the body is off the track, by up to {error.max():.2f} m")
+    error = movement.root_error(played.pelvis, movement.track_at(track, played.times), played.motion.fps)
+    return _line(played.times, error > OFF_TRACK, f"the body is off the track, by up to {error.max(initial=0.0):.2f} m")
 
 
 def _late(played: Played, keys: list[Moment]) -> TimedLine | None:
@@ -231,8 +191,8 @@ def _out_of_reach(played: Played, keys: list[Moment]) -> TimedLine | None:
 
 def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> TimedLine | None:
     """The line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None where there are none."""
-    told = ", ".join(f"{told_time(time)} s by {form.format(value)}" for time, value in found)
-    return TimedLine(f"{what}: {told}", *((time, time) for time, _ in found)) if found else None
+    listed = ", ".join(f"{told_time(time)} s by {form.format(value)}" for time, value in found)
+    return TimedLine(f"{what}: {listed}", *((time, time) for time, _ in found)) if found else None
 
 
 def _other_words(
@@ -251,16 +211,12 @@ def _other_words(
     flags = np.zeros(len(missing), bool)
     for low, high in long:
         flags[low:high] = bool(missing[low])
-    if not np.any(flags):
-        return None
     count = Counter(word for frame in np.flatnonzero(flags) for word in sorted(missing[frame]))
-    told = ", ".join(word for word, _ in count.most_common(3)) + (", ..." if len(count) > 3 else "")
-    return _line(played.times, flags, f"words asked for and not shown: {told}")
+    words = ", ".join(word for word, _ in count.most_common(3)) + (", ..." if len(count) > 3 else "")
+    return _line(played.times, flags, f"words asked for and not shown: {words}")
 
 
 def _below_ground(played: Played) -> TimedLine | None:
     lowest = played.positions[..., 2].min(axis=1)
-    below = lowest < -BELOW_GROUND
-    if not np.any(below):
-        return None
-    return _line(played.times, below, f"the body goes into the ground, by up to {-100 * lowest.min():.1f} cm")
+    depth = -100 * lowest.min(initial=0.0)
+    return _line(played.times, lowest < -BELOW_GROUND, f"the body goes into the ground, by up to {depth:.1f} cm")

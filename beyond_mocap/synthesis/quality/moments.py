@@ -14,8 +14,7 @@ from ...library.library import Library
 from ...library.made import MADE_FOLDER
 from ...motion.track import Track
 from ..take import DribbleTouch
-from . import pieces
-from .played import Played
+from .played import Played, find_transitions, number_pieces
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,11 +41,11 @@ class Moment:
 
 def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, library: Library | None) -> list[Moment]:
     """Every asked key moment as it was played; stride (T,): source frames per output frame at recorded speed."""
-    starts = pieces.seams(played.clip, played.mirrored, played.clip_frame, stride)
-    number = pieces.runs(len(played.clip), starts)
-    told = {result.asked: result for result in played.keys}
+    starts = find_transitions(played.clip, played.mirrored, played.clip_frame, stride)
+    number = number_pieces(len(played.clip), starts)
+    results = {result.asked: result for result in played.keys}
     library = with_made(library, played)
-    return [_moment(played, key, number, told.get(key), library) for key in keys]
+    return [_moment(played, key, number, results.get(key), library) for key in keys]
 
 
 def with_made(library: Library | None, played: Played) -> Library | None:
@@ -124,8 +123,8 @@ def ball_gap(played: Played, moment: Moment) -> float:
     if played.ball is None:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]
-    words = touching_words(moment)
-    return abs(float(contact_gap(played.motion.skeleton, *pose, words, written_ball(played, moment.frame))))
+    ball = written_ball(played, moment.frame)
+    return abs(float(contact_gap(played.motion.skeleton, *pose, touching_words(moment), ball)))
 
 
 def met(played: Played, moment: Moment) -> tuple[float, float]:

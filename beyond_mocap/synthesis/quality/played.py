@@ -1,4 +1,9 @@
-"""What was played: a body's motion, the ball, and where every frame came from; the same from memory and from files."""
+"""What was played: a body's motion, the ball, where every frame came from, and the pieces of clips that it is made of;
+the same from memory and from files.
+
+Pieces are read off clip (T,) an integer per clip (negative where unknown), mirrored (T,) bool, clip_frame (T,)
+fractional in the clip's own rate, and `stride` (T,), the source frames that pass in one output frame at recorded speed.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +22,10 @@ from ...motion.humanoid import Humanoid, identify
 from ...motion.motion import Motion, forward_kinematics
 from ...motion.track.ball_path import BallPath
 from ..take import KeyResult, Take
-from .feet import foot_joints
+from .movement import foot_joints
+
+LOOP_SECONDS = 4.0
+LOOP_REACH = 80.0 / 60.0
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,26 +96,13 @@ class Played:
         return rates[self.clip]
 
 
-def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
-    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
-    forward = steps[steps > 0]
-    return float(np.median(forward)) if len(forward) else 1.0
-
-
 def played_from_take(take: Take) -> Played:
     """What a take in memory plays."""
     return Played(
-        motion=take.motion,
-        start_time=take.start_time,
-        clips=tuple(take.clips),
-        clip=np.asarray(take.clip, dtype=int),
-        clip_frame=np.asarray(take.clip_frame, dtype=float),
-        mirrored=np.asarray(take.mirrored, dtype=bool),
-        words=tuple(take.words),
-        contacts=np.asarray(take.contacts, dtype=bool),
-        ball=take.ball,
-        correction=take.correction,
-        keys=tuple(take.keys),
+        motion=take.motion, start_time=take.start_time, clips=tuple(take.clips), clip=np.asarray(take.clip, dtype=int),
+        clip_frame=np.asarray(take.clip_frame, dtype=float), mirrored=np.asarray(take.mirrored, dtype=bool),
+        words=tuple(take.words), contacts=np.asarray(take.contacts, dtype=bool), ball=take.ball,
+        correction=take.correction, keys=tuple(take.keys),
     )
 
 
@@ -117,10 +112,9 @@ def played_from_tables(
     """What a motion read from a file plays, with its provenance and ball where they are known.
 
     provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
-    clip_frame (T,),
-    mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at `start_time` and
-    contacts are detected on the motion itself. where: the table's file, for messages. InputError where it has another
-    length.
+    clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at
+    `start_time` and contacts are detected on the motion itself. where: the table's file, for messages. InputError where
+    it has another length.
     """
     count = len(motion)
     if provenance is None:
@@ -131,13 +125,83 @@ def played_from_tables(
         raise InputError(where, f"{len(provenance.clip)} rows", f"one per frame of the motion, {count}")
     clips, index = np.unique(np.asarray(provenance.clip, dtype=str), return_inverse=True)
     return Played(
-        motion=motion,
-        start_time=float(provenance.times[0]),
-        clips=tuple(str(clip) for clip in clips),
-        clip=index.reshape(-1),
-        clip_frame=np.asarray(provenance.clip_frame, dtype=float),
-        mirrored=np.asarray(provenance.mirrored, dtype=bool),
-        words=tuple(map(tuple, provenance.words)),
-        contacts=np.asarray(provenance.contacts, dtype=bool),
-        ball=ball,
+        motion=motion, start_time=float(provenance.times[0]), clips=tuple(str(clip) for clip in clips),
+        clip=index.reshape(-1), clip_frame=np.asarray(provenance.clip_frame, dtype=float),
+        mirrored=np.asarray(provenance.mirrored, dtype=bool), words=tuple(map(tuple, provenance.words)),
+        contacts=np.asarray(provenance.contacts, dtype=bool), ball=ball,
     )
+
+
+def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+    """Output frames (S,) that start a new piece: the clip (or its mirroring) changes, or clip_frame jumps.
+
+    A jump is a step of more than 1.5 frames times the warp there, in frames of the output's rate, or of less than half
+    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side.
+    """
+    rate = played_rate(clip, mirrored, clip_frame, stride)
+    known = (clip[1:] >= 0) | (clip[:-1] >= 0)
+    warp = np.maximum(_neighbours_median(rate), 0.25)
+    jump = (rate > 1.5 * warp) | (rate < 0.5 * warp)
+    return np.flatnonzero(known & (np.isnan(rate) | jump)) + 1
+
+
+def number_pieces(count: int, starts: np.ndarray) -> np.ndarray:
+    """Number of the run that each of `count` frames belongs to: (T,) int, one more at every seam in `starts`."""
+    flags = np.zeros(count, dtype=int)
+    flags[starts] = 1
+    return np.cumsum(flags)
+
+
+def played_rate(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+    """Played / recorded speed from each frame to the next: (T-1,), NaN where the clip changes or is not known."""
+    rate = np.diff(clip_frame) / stride[:-1]
+    same = (clip[1:] == clip[:-1]) & (mirrored[1:] == mirrored[:-1]) & (clip[1:] >= 0)
+    return np.where(same, rate, np.nan)
+
+
+def warp_rates(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray) -> np.ndarray:
+    """Played / recorded speed of every step inside a run: (N,)."""
+    rate = played_rate(clip, mirrored, clip_frame, stride)
+    rate[find_transitions(clip, mirrored, clip_frame, stride) - 1] = np.nan
+    return rate[np.isfinite(rate)]
+
+
+def find_replayed(
+    clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndarray, stride: np.ndarray, fps: float
+) -> np.ndarray:
+    """Frames that replay a stretch played less than 4 s before: (T,) bool.
+
+    A frame replays where an earlier run of the same clip (same side) showed a frame within 80 source frames at 60 fps
+    (1.33 s of the clip) of it in the last 4 s. A run that starts beyond everything the earlier run showed only skipped
+    ahead, and does not count.
+    """
+    number = number_pieces(len(clip), find_transitions(clip, mirrored, clip_frame, stride))
+    first, last = np.full(number[-1] + 1, np.inf), np.full(number[-1] + 1, -np.inf)
+    np.fmin.at(first, number, clip_frame)
+    np.fmax.at(last, number, clip_frame)
+    out = np.zeros(len(clip), dtype=bool)
+    for lag in range(1, min(int(np.ceil(LOOP_SECONDS * fps)), len(clip))):
+        same = (clip[lag:] == clip[:-lag]) & (mirrored[lag:] == mirrored[:-lag]) & (clip[lag:] >= 0)
+        other = same & (number[lag:] != number[:-lag]) & (first[number[lag:]] < last[number[:-lag]])
+        near = np.abs(clip_frame[lag:] - clip_frame[:-lag]) < LOOP_REACH * fps * stride[lag:]
+        out[lag:] |= other & near
+    return out
+
+
+def _usual_step(clip_frame: np.ndarray, mine: np.ndarray) -> float:
+    steps = np.diff(clip_frame)[mine[1:] & mine[:-1]]
+    forward = steps[steps > 0]
+    return float(np.median(forward)) if len(forward) else 1.0
+
+
+def _neighbours_median(rate: np.ndarray, reach: int = 4) -> np.ndarray:
+    """Median of the finite rates up to `reach` steps away on either side, the step itself left out; 1 where there are
+    none."""
+    padded = np.pad(rate, reach, constant_values=np.nan)
+    around = np.stack([padded[reach + k : reach + k + len(rate)] for k in range(-reach, reach + 1) if k])
+    around[~np.isfinite(around)] = np.nan
+    around.sort(axis=0)
+    count = np.sum(np.isfinite(around), axis=0)
+    column = np.arange(len(rate))
+    low, high = np.maximum(count - 1, 0) // 2, np.minimum(count // 2, np.maximum(count - 1, 0))
+    return np.where(count > 0, 0.5 * (around[low, column] + around[high, column]), 1.0)

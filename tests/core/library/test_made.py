@@ -17,7 +17,7 @@ from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics
 from beyond_mocap.motion.track import Track
 from beyond_mocap.synthesis.plan import Plan
-from beyond_mocap.synthesis.quality.feet import stance_travel, stances
+from beyond_mocap.synthesis.quality.movement import stance_travel, stances
 from beyond_mocap.synthesis.synthesize import synthesize
 from beyond_mocap.synthetic.gestures import strike
 

@@ -8,8 +8,7 @@ from beyond_mocap.match.crowd.crowd import kept_apart, overlap_depths
 from beyond_mocap.match.crowd.spacing import keeping
 from beyond_mocap.motion.contacts import detect
 from beyond_mocap.motion.motion import forward_kinematics, place
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
-from beyond_mocap.synthesis.quality.jerk import jerk
+from beyond_mocap.synthesis.quality.movement import contact_speeds, foot_joints, jerk
 from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0

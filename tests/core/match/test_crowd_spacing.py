@@ -12,7 +12,7 @@ from beyond_mocap.match.shown import looking
 from beyond_mocap.motion import quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import forward_kinematics, place
-from beyond_mocap.synthesis.quality.jerk import jerk
+from beyond_mocap.synthesis.quality.movement import jerk
 from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0

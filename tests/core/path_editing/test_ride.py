@@ -7,7 +7,7 @@ from beyond_mocap.base.errors import InputError
 from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.path_editing.path_line import through
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
+from beyond_mocap.synthesis.quality.movement import contact_speeds, foot_joints
 from beyond_mocap.synthetic.gait import gait
 
 RIGID = RideSettings(plant=False, lean=False)

@@ -7,7 +7,7 @@ from beyond_mocap.motion.motion import Motion, forward_kinematics
 from beyond_mocap.motion.path.terrain import Terrain
 from beyond_mocap.path_editing.path_line import through
 from beyond_mocap.path_editing.ride import RideSettings, prepare, ride
-from beyond_mocap.synthesis.quality.feet import contact_speeds, foot_joints
+from beyond_mocap.synthesis.quality.movement import contact_speeds, foot_joints
 from beyond_mocap.synthetic.gait import gait
 
 SLOPE = np.tan(np.radians(12.0))

@@ -13,7 +13,7 @@ from beyond_mocap.motion.humanoid import heading, identify
 from beyond_mocap.motion.motion import Motion, at_frames, forward_kinematics, place
 from beyond_mocap.motion.track import BALL_RADIUS, Track
 from beyond_mocap.synthesis.plan import Plan, SolvedCourse, Touched
-from beyond_mocap.synthesis.quality.jerk import jerk, windowed
+from beyond_mocap.synthesis.quality.movement import jerk, windowed
 from beyond_mocap.synthetic.gait import gait
 from beyond_mocap.synthetic.throws import throw
 from beyond_mocap.throws.join_throw import EASED, join_throw, library_jerk, stand_still, transition_jerk, trim_waiting

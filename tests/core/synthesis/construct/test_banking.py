@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import place, pose_kinematics
-from beyond_mocap.synthesis.construct.banking import LEGS, MOST_LEAN, TRUNK, banked, missing_lean
+from beyond_mocap.synthesis.construct.on_track import LEGS_LEAN, MOST_LEAN, TRUNK_LEAN, lean_into_curves, missing_lean
 from beyond_mocap.synthetic.gait import gait
 
 FPS, COUNT = 30.0, 90
@@ -26,7 +26,7 @@ def footage(speed, radius):
 def test_a_straight_recording_on_a_curve_lacks_all_of_it(radius):
     lean = missing_lean(*curve(5.0, radius), *footage(5.0, np.inf), NO_SEAM, FPS)
     asked = 5.0**2 / radius / 9.81
-    limit = MOST_LEAN / LEGS
+    limit = MOST_LEAN / LEGS_LEAN
     assert np.allclose(lean[15:-15], limit * np.tanh(asked / limit), rtol=0.02)
     assert np.abs(lean).max() < 1.05 * abs(asked)
 
@@ -38,7 +38,7 @@ def test_a_recording_of_the_same_curve_lacks_nothing():
 
 def test_no_lean_when_slow_and_never_too_much():
     assert np.abs(missing_lean(*curve(1.4, 0.5), *footage(1.4, np.inf), NO_SEAM, FPS)).max() < 1e-9
-    assert LEGS * np.abs(missing_lean(*curve(8.0, 3.0), *footage(8.0, np.inf), NO_SEAM, FPS)).max() <= MOST_LEAN
+    assert LEGS_LEAN * np.abs(missing_lean(*curve(8.0, 3.0), *footage(8.0, np.inf), NO_SEAM, FPS)).max() <= MOST_LEAN
 
 
 def test_a_seam_is_no_turn():
@@ -52,7 +52,7 @@ def test_a_seam_is_no_turn():
 def test_legs_lean_by_their_share_and_the_trunk_by_less(heading):
     motion = place(gait(4.0, 3.0, FPS), heading)
     lean = np.full(len(motion), 0.3)
-    out = banked(motion.skeleton, motion.rotations, np.full(len(motion), heading), lean)
+    out = lean_into_curves(motion.skeleton, motion.rotations, np.full(len(motion), heading), lean)
     body, across = identify(motion.skeleton), np.array([-np.sin(heading), np.cos(heading), 0.0])
     places, _ = pose_kinematics(motion.skeleton, motion.root_positions, motion.rotations)
     after, _ = pose_kinematics(motion.skeleton, motion.root_positions, out)
@@ -63,14 +63,14 @@ def test_legs_lean_by_their_share_and_the_trunk_by_less(heading):
 
     for side in (body.left, body.right):
         leg = side.foot, side.upper_leg
-        assert tilt(after, *leg) - tilt(places, *leg) == pytest.approx(LEGS * 0.3, abs=0.01)
+        assert tilt(after, *leg) - tilt(places, *leg) == pytest.approx(LEGS_LEAN * 0.3, abs=0.01)
     low = body.spine[0]
-    assert tilt(after, low, body.neck) - tilt(places, low, body.neck) == pytest.approx(TRUNK * 0.3, abs=0.01)
+    assert tilt(after, low, body.neck) - tilt(places, low, body.neck) == pytest.approx(TRUNK_LEAN * 0.3, abs=0.01)
 
 
 def test_who_does_not_lean_stays_as_he_is():
     motion = gait(4.0, 1.0, FPS)
-    still = banked(motion.skeleton, motion.rotations, np.zeros(len(motion)), np.zeros(len(motion)))
+    still = lean_into_curves(motion.skeleton, motion.rotations, np.zeros(len(motion)), np.zeros(len(motion)))
     assert np.allclose(still, motion.rotations, atol=1e-12)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.humanoid import identify
-from beyond_mocap.synthesis.construct.ball.carry import (
+from beyond_mocap.synthesis.construct.carry import (
     LEAST_ANGLE,
     MOST_ANGLE,
     Body,

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion import quaternion
-from beyond_mocap.synthesis.construct.cross_fade import faded_rotations, faded_values, share
+from beyond_mocap.synthesis.construct.transitions import fade_share, faded_rotations, faded_values
 
 SEAM, REACH, COUNT = 30, 6, 60
 AT = np.arange(SEAM - REACH, SEAM + REACH)
 THROUGH = np.arange(1, 2 * REACH + 1) / (2.0 * REACH + 1.0)
-WEIGHT = share(THROUGH, AT >= SEAM)
+WEIGHT = fade_share(THROUGH, AT >= SEAM)
 
 
 def two_pieces():
@@ -22,8 +22,8 @@ def test_the_share_grows_to_half_at_the_seam_and_falls_again():
     assert np.all(WEIGHT >= 0.0) and np.all(WEIGHT <= 0.55) and WEIGHT[0] < 0.01 and WEIGHT[-1] < 0.01
     assert np.all(np.diff(WEIGHT[:REACH]) > 0) and np.all(np.diff(WEIGHT[REACH:]) < 0)
     through = np.linspace(0.0, 1.0, 1001)
-    rising = share(through, np.zeros(1001, bool))
-    assert np.allclose(rising + share(through, np.ones(1001, bool)), 1.0)
+    rising = fade_share(through, np.zeros(1001, bool))
+    assert np.allclose(rising + fade_share(through, np.ones(1001, bool)), 1.0)
     for times in (1, 2):  # slope and curvature start and end at 0
         bent = np.diff(rising, times) * 1000.0**times
         assert np.allclose(bent[[0, -1]], 0.0, atol=0.1)

@@ -13,8 +13,8 @@ from beyond_mocap.motion.contacts import detect
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import pose_kinematics
 from beyond_mocap.motion.track import BALL_RADIUS
-from beyond_mocap.synthesis.construct.ball.dribble import dribble
-from beyond_mocap.synthesis.construct.ball.meeting import lead, led
+from beyond_mocap.synthesis.construct.dribble import dribble
+from beyond_mocap.synthesis.construct.meeting import lead, led
 from beyond_mocap.synthetic.gait import gait
 
 FPS = 30.0

@@ -6,7 +6,7 @@ import pytest
 from beyond_mocap.motion import contacts, quaternion
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import place, pose_kinematics
-from beyond_mocap.synthesis.construct.give import give
+from beyond_mocap.synthesis.construct.on_track import absorb_foot_slide
 from beyond_mocap.synthetic.gait import gait
 
 
@@ -26,7 +26,7 @@ def slide(motion, root, rotations, stands):
 
 
 def given(motion, root, rotations, stands):
-    move, turn = give(motion.skeleton, root, rotations, stands, motion.fps)
+    move, turn = absorb_foot_slide(motion.skeleton, root, rotations, stands, motion.fps)
     turned = rotations.copy()
     turned[:, 0] = quaternion.multiply(quaternion.about_up(turn), rotations[:, 0])
     return move, turn, root + np.column_stack([move, np.zeros(len(root))]), turned
@@ -53,10 +53,10 @@ def test_a_body_that_swings_on_its_feet_turns_less(walk):
 
 def test_nothing_gives_where_nothing_slides(walk):
     motion, stands = walk
-    move, turn = give(motion.skeleton, motion.root_positions, motion.rotations, stands, 30.0)
+    move, turn = absorb_foot_slide(motion.skeleton, motion.root_positions, motion.rotations, stands, 30.0)
     assert np.abs(move).max() < 0.01 and np.abs(turn).max() < 0.03
     slid = motion.root_positions + np.outer(np.arange(len(motion)) / 30.0, [0.4, 0.0, 0.0])
-    move, turn = give(motion.skeleton, slid, motion.rotations, np.zeros_like(stands), 30.0)
+    move, turn = absorb_foot_slide(motion.skeleton, slid, motion.rotations, np.zeros_like(stands), 30.0)
     assert np.allclose(move, 0.0) and np.allclose(turn, 0.0)
 
 
@@ -65,8 +65,8 @@ def test_it_does_not_ask_which_way_one_goes(walk):
     surge = np.outer(0.05 * np.sin(np.arange(len(motion)) / 3.0), [1.0, 0.0, 0.0])
     there = place(motion, 2.0)
     turned = quaternion.rotate(quaternion.about_up(np.full(len(motion), 2.0)), surge)
-    one = give(motion.skeleton, motion.root_positions + surge, motion.rotations, stands, 30.0)
-    other = give(motion.skeleton, there.root_positions + turned, there.rotations, stands, 30.0)
+    one = absorb_foot_slide(motion.skeleton, motion.root_positions + surge, motion.rotations, stands, 30.0)
+    other = absorb_foot_slide(motion.skeleton, there.root_positions + turned, there.rotations, stands, 30.0)
     assert np.allclose(quaternion.turned_level(one[0], np.full(len(motion), 2.0)), other[0], atol=1e-9)
     assert np.allclose(one[1], other[1], atol=1e-9)
 
@@ -74,7 +74,8 @@ def test_it_does_not_ask_which_way_one_goes(walk):
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 40])
 def test_few_frames(walk, count):
     motion = walk[0].frames(0, count)
-    move, turn = give(motion.skeleton, motion.root_positions, motion.rotations, np.ones((count, 2, 2), bool), 30.0)
+    stands = np.ones((count, 2, 2), bool)
+    move, turn = absorb_foot_slide(motion.skeleton, motion.root_positions, motion.rotations, stands, 30.0)
     assert move.shape == (count, 2) and turn.shape == (count,) and np.isfinite(move).all() and np.isfinite(turn).all()
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from beyond_mocap.annotation.striking import FOOT_RADIUS, ball_gap
 from beyond_mocap.motion.track import BALL_RADIUS
-from beyond_mocap.synthesis.construct.ball.meeting import Aim, Room, best_aim, meetings
+from beyond_mocap.synthesis.construct.meeting import Aim, Room, best_aim, meetings
 
 FOOT = np.array([[0.0, 0.0, 0.11], [0.16, 0.0, 0.11]])
 ASIDE, AHEAD = np.array([0.0, 1.0, 0.0]), np.array([1.0, 0.0, 0.0])

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from beyond_mocap.motion.track import zero_phase_hann
-from beyond_mocap.synthesis.construct.on_track import OFF_THE_FEET, facing, firmness, pulled_to_track, root_with_sway
+from beyond_mocap.synthesis.construct.on_track import (
+    OFF_THE_FEET,
+    facing,
+    pulled_to_track,
+    root_with_sway,
+    turning_firmness,
+)
 
 
 def ahead(count, speed=2.0, angle=0.0):
@@ -97,7 +103,7 @@ def test_who_lies_does_not_turn_but_who_stands_up_afterwards_does():
     direction = np.where(np.arange(count) < 15, 0.0, 2.0)
     speed = np.where((np.arange(count) < 15) | (np.arange(count) > 105), 2.0, 0.0)
     velocity = np.tile([2.0, 0.0], (count, 1))
-    firm = firmness(standing, height, 30.0)
+    firm = turning_firmness(standing, height, 30.0)
     assert (firm[lying] == OFF_THE_FEET).all() and (firm[~lying] == 1.0).all()
     loose, kept = (facing(direction, speed, velocity, np.zeros(count), firm=f) for f in (1.0, firm))
     assert np.ptp(loose[lying]) > 0.8 and np.ptp(kept[lying]) < 0.25
@@ -107,4 +113,4 @@ def test_who_lies_does_not_turn_but_who_stands_up_afterwards_does():
 def test_the_flights_of_running_and_a_single_step_stay_as_they_were():
     standing = np.ones((60, 2, 2), bool)
     standing[10:17] = standing[30:37] = False
-    assert (firmness(standing, np.full(60, 0.9), 30.0) == 1.0).all()
+    assert (turning_firmness(standing, np.full(60, 0.9), 30.0) == 1.0).all()

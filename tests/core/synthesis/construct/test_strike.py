@@ -10,7 +10,7 @@ from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.motion.contacts import detect
 from beyond_mocap.motion.humanoid import identify
 from beyond_mocap.motion.motion import Motion, pose_kinematics
-from beyond_mocap.synthesis.construct.ball.strike import BALL_NOISE, MOST_DROP, MOST_MOVED, Touch, strike
+from beyond_mocap.synthesis.construct.strike import BALL_NOISE, MOST_DROP, MOST_MOVED, Touch, strike
 from beyond_mocap.synthetic import gestures
 from beyond_mocap.synthetic.gait import gait
 

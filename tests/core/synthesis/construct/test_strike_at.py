@@ -9,7 +9,7 @@ from beyond_mocap.annotation.striking import ball_gap
 from beyond_mocap.ball.contact import ball_centre, striking_surface, struck_from
 from beyond_mocap.motion.humanoid import heading_from_positions
 from beyond_mocap.motion.motion import forward_kinematics
-from beyond_mocap.synthesis.construct.ball.strike_at import MOST, Meeting, met_at
+from beyond_mocap.synthesis.construct.strike_at import MOST, Meeting, met_at
 from beyond_mocap.synthetic.volleys import BEFORE, volley
 
 FPS = 60.0

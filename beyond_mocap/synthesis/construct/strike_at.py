@@ -1,6 +1,6 @@
 """A part of the body brought to a ball that stays where it is: the ball's flight is given, the body meets it.
 
-`synthesis.construct.ball.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
+`synthesis.construct.strike` moves a tracked ball within its noise; here there is no noise. The part is moved by
 the shortest way that closes the gap at the frame of the strike: a limb swings about its upper joint, head and chest by
 bending the spine, any other joint with the whole body; before and after it eases back, a foot between its lift-off and
 its landing.
@@ -13,19 +13,25 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ....annotation.striking import Surface, ball_gap, nearest_on
-from ....motion.humanoid import identify
-from ....motion.motion import Motion
-from ..above_ground import above_ground
-from .carry import MOST_SWING, Body, Resting, arm, leg, limb_carried, spine_bent, swing_to, swung
-from .meeting import eased
+from ...annotation.striking import Surface, ball_gap, nearest_on
+from ...motion.humanoid import identify
+from ...motion.motion import Motion
+from .carry import (
+    MOST_SWING,
+    Body,
+    Resting,
+    above_ground,
+    foot_kept,
+    limb_carried,
+    limb_chain,
+    spine_bent,
+    swing_to,
+    swung,
+)
+from .meeting import eased_around
 
-LONGEST, SHORTEST = 0.5, 0.12
-"""Seconds before and after a strike within which the part comes to the ball and goes back, at most and at least."""
-
-MOST = 0.35
-"""Metres that a part is moved at most."""
-
+LONGEST, SHORTEST = 0.5, 0.12  # s before and after a strike within which the part comes to the ball and goes back
+MOST = 0.35  # m that a part is moved at most
 _ROUNDS, _CLOSE = 6, 2e-4
 
 
@@ -81,16 +87,12 @@ def _share(meeting: Meeting, at: int, count: int, standing: np.ndarray, fps: flo
         before, after = np.flatnonzero(stands[:at]), np.flatnonzero(stands[at + 1 :])
         lift, land = before[-1] if len(before) else -np.inf, at + 1 + after[0] if len(after) else np.inf
         low, high = max(low, min(lift, at - SHORTEST * fps)), min(high, max(land, at + SHORTEST * fps))
-    frames = np.arange(count)
-    return eased((frames - low) / max(at - low, 1e-9), (high - frames) / max(high - at, 1e-9))
+    return eased_around(np.arange(count), low, at, at, high)
 
 
-def _reached(
-    body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool
-) -> tuple[Body, float, float]:
+def _reached(body: Body, meeting: Meeting, at: int, share: np.ndarray, grounded: bool) -> tuple[Body, float, float]:
     """The body with its part at the ball, how far the part was moved and what gap is left, m."""
-    shift, best = np.zeros(3), (body, 0.0, abs(_gap(body, meeting, at)))
-    struck = body
+    shift, struck, best = np.zeros(3), body, (body, 0.0, abs(_gap(body, meeting, at)))
     for _ in range(_ROUNDS):
         line = struck.line(meeting.surface, at)
         way = meeting.ball - nearest_on(line, meeting.ball)
@@ -113,16 +115,12 @@ def _gap(body: Body, meeting: Meeting, at: int) -> float:
     return float(ball_gap(body.line(meeting.surface, at), meeting.surface.radius, meeting.ball, meeting.radius))
 
 
-def _carried(
-    body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool
-) -> Body:
+def _carried(body: Body, surface: Surface, at: int, shift: np.ndarray, share: np.ndarray, grounded: bool) -> Body:
     """The body with the surface moved by `shift` (3,) m at frame `at`, by its share (W,) around it."""
-    human = identify(body.skeleton)
     root, rotations = body.root, body.rotations
     if surface.part in ("foot", "hand", "tool"):
-        limb = getattr(human, surface.side)
-        kind, chain = ("foot", leg(limb)) if surface.part == "foot" else ("hand", arm(limb))
-        swing = swing_to(body, chain, at, body.places[at, chain[2]] + shift, MOST_SWING[kind])
+        chain, most = limb_chain(body.skeleton, surface), MOST_SWING["foot" if surface.part == "foot" else "hand"]
+        swing = swing_to(body, chain, at, body.places[at, chain[2]] + shift, most)
         moves = swung(body, chain, swing, share)
         if grounded and surface.part == "foot":
             moves = above_ground(body, surface, slice(None), moves)
@@ -130,8 +128,7 @@ def _carried(
     elif surface.part in ("head", "chest"):
         rotations = spine_bent(body, surface, at, shift, share)
     else:
-        root = root + share[:, None] * shift
+        root, human = root + share[:, None] * shift, identify(body.skeleton)
         for limb in (human.left, human.right):
-            held = Resting.of(body, leg(limb), soft=1e-3)
-            rotations = limb_carried(body, held, np.zeros_like(root), root, rotations)
+            rotations = foot_kept(body, limb, root, rotations)
     return Body.posed(body.skeleton, root, rotations)

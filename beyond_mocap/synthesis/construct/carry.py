@@ -1,4 +1,5 @@
 """A part of the body carried elsewhere: a foot or hand by its limb, head or chest by the spine, the rest as it was.
+The ground is at height 0.
 
 A limb is swung about its upper joint and bends or straightens by a share of the way to the least or largest angle of
 its knee or elbow. A shift of the foot in space, the same at every frame, would ask for more than the leg's length where
@@ -14,25 +15,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import Surface
-from ....motion import quaternion
-from ....motion.humanoid import Limb, identify
-from ....motion.limb import inner_angle, two_bone
-from ....motion.motion import pose_kinematics
-from ....motion.skeleton import Skeleton
+from ...annotation.striking import Surface
+from ...base.vectors import skew_matrix
+from ...motion import quaternion
+from ...motion.humanoid import Limb, identify
+from ...motion.limb import inner_angle, two_bone
+from ...motion.motion import pose_kinematics
+from ...motion.skeleton import Skeleton
 
-MOST_BEND = {"head": 0.6, "chest": 0.35}
-"""Radians that the whole spine bends at most."""
-
+MOST_BEND = {"head": 0.6, "chest": 0.35}  # rad that the whole spine bends at most
 LEAST_ANGLE, MOST_ANGLE = np.radians(35.0), np.radians(170.0)
 """Radians inside a knee or elbow that a carried limb has at least and at most, unless the recording has less or
 more."""
 
-MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}
-"""Radians that the whole limb turns about its hip or shoulder at most."""
-
+MOST_SWING = {"foot": np.radians(35.0), "hand": np.radians(60.0)}  # rad that a whole limb turns about its upper joint
 SOFT = 0.003  # m below full length from where a limb eases
 _DAMPING = 1e-3  # keeps the bend of a spine small where it moves the part little
+
+_SOLE, _ROUNDING = 0.02, 0.03  # metres of the lowest foot joint above the ground, and over which it nears that
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +64,12 @@ def leg(limb: Limb) -> tuple[int, int, int]:
 def arm(limb: Limb) -> tuple[int, int, int]:
     """Shoulder, elbow and wrist."""
     return limb.upper_arm, limb.lower_arm, limb.hand
+
+
+def limb_chain(skeleton: Skeleton, part: Surface) -> tuple[int, int, int]:
+    """The joints of the limb that a foot, a hand or a tool in a hand hangs on."""
+    limb = getattr(identify(skeleton), part.side)
+    return leg(limb) if part.part == "foot" else arm(limb)
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,12 +153,9 @@ def limb_carried(
     return out
 
 
-def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
-    """World rotations (W, 4) of a limb's joints with other local ones, what is above the limb being as in `body`."""
-    world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
-    for joint in _path(body.skeleton, chain[0], chain[2]):
-        above = world[joint] = quaternion.multiply(above, rotations[:, joint])
-    return world
+def foot_kept(body: Body, limb: Limb, root: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    """Local rotations (W, J, 4) with a foot where `body` has it, though its root is now at root (W, 3) m."""
+    return limb_carried(body, Resting.of(body, leg(limb), soft=1e-3), np.zeros_like(body.root), root, rotations)
 
 
 def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -164,12 +167,12 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
     """
     skeleton, joint = body.skeleton, surface.start[0]
     hips = identify(skeleton).hips
-    bending = [j for j in _path(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
+    bending = [j for j in joints_down(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]
     if not bending:
         return body.rotations.copy()
     middle = np.mean(body.line(surface, at), axis=0)
     arms = middle - body.places[at, bending]
-    moves = np.mean([_cross_matrix(a).T for a in arms], axis=0)
+    moves = np.mean([skew_matrix(a).T for a in arms], axis=0)
     bend = np.linalg.solve(moves.T @ moves + _DAMPING * np.eye(3), moves.T @ shift)
     bend *= min(1.0, MOST_BEND[surface.part] / max(np.linalg.norm(bend), 1e-9))
     carried = quaternion.rotate(quaternion.inverse(body.world[at, hips]), bend / len(bending))
@@ -182,14 +185,37 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
     return out
 
 
-def _cross_matrix(v: np.ndarray) -> np.ndarray:
-    """(3, 3) of v x."""
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
+def above_ground(body: Body, foot: Surface, at, shift: np.ndarray) -> np.ndarray:
+    """Shifts (..., 3) m of a foot at frames `at` that does not go through the ground, but where it is there already."""
+    tip = foot_tip(body.skeleton, getattr(identify(body.skeleton), foot.side), body.places[at], body.world[at])[1]
+    lowest = np.minimum(np.min(body.line(foot, at), axis=0)[..., 2], tip[..., 2])
+    out = shift.copy()
+    least, wish = np.minimum(_SOLE - lowest, 0.0), shift[..., 2]
+    # a maximum without a corner: at its sharpest _ROUNDING is between the two, and nothing where nothing is moved
+    corner = _ROUNDING * np.minimum(1.0, np.linalg.norm(shift, axis=-1) / (2.0 * _ROUNDING))
+    out[..., 2] = 0.5 * (wish + least + np.hypot(wish - least, corner))
+    return out
 
 
-def _path(skeleton: Skeleton, high: int, low: int) -> list[int]:
+def foot_tip(skeleton: Skeleton, limb: Limb, places: np.ndarray, world: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends (..., 3) m of what is beyond a foot's foremost joint, twice the joint where nothing is; places (..., J,
+    3) m and world (..., J, 4) of the joints."""
+    toe = limb.toe_or_foot
+    offset = next((o for p, o in zip(skeleton.end_parents, skeleton.end_offsets) if p == toe), np.zeros(3))
+    return places[..., toe, :], places[..., toe, :] + quaternion.rotate(world[..., toe, :], offset)
+
+
+def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
     """Joints from `high` down to `low`, both included."""
     chain = [low]
     while chain[-1] != high:
         chain.append(skeleton.parents[chain[-1]])
     return chain[::-1]
+
+
+def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
+    """World rotations (W, 4) of a limb's joints with other local ones, what is above the limb being as in `body`."""
+    world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
+    for joint in joints_down(body.skeleton, chain[0], chain[2]):
+        above = world[joint] = quaternion.multiply(above, rotations[:, joint])
+    return world

@@ -2,43 +2,49 @@
 
 The body never leaves its track for the ball. First the ball moves, within the noise of its measurement, to where the
 recorded foot (head, chest, hand) strikes; what is left the limb does by two-bone inverse kinematics, or the spine by
-bending, as far as a body reaches; what is left then is told. A kick lasts a hundredth of a second, so between the two
-frames around the key moment the ball goes along with the foot.
+bending, as far as a body reaches; what is left then is reported. A kick lasts a hundredth of a second, so between the
+two frames around the key moment the ball goes along with the foot.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from ....annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
-from ....annotation.labels import list_labels
-from ....annotation.striking import Surface, ball_gap, part_surfaces
-from ....base.vectors import unit_vector
-from ....motion.humanoid import Limb, heading_from_positions, identify
-from ....motion.motion import pose_kinematics
-from ....motion.skeleton import Skeleton
-from ....motion.track import BALL_RADIUS
-from ..above_ground import above_ground
-from .carry import MOST_ANGLE, MOST_SWING, Body, Resting, Swing, arm, leg, limb_carried, spine_bent, swing_to, swung
-from .meeting import Aim, Room, best_aim, eased, held_meeting, lofted, meetings, shifted
+from ...annotation.ball_contact import by_both_hands, contact_gap, met_within, surfaces
+from ...annotation.labels import list_labels
+from ...annotation.striking import Surface, ball_gap, part_surfaces
+from ...base.vectors import unit_vector
+from ...motion.humanoid import heading_from_positions, identify
+from ...motion.motion import pose_kinematics
+from ...motion.skeleton import Skeleton
+from ...motion.track import BALL_RADIUS
+from .carry import (
+    MOST_ANGLE,
+    MOST_SWING,
+    Body,
+    Resting,
+    Swing,
+    above_ground,
+    foot_kept,
+    limb_carried,
+    limb_chain,
+    spine_bent,
+    swing_to,
+    swung,
+)
+from .meeting import Aim, Room, best_aim, eased_around, held_meeting, lofted, meetings, shifted
 
 BALL_NOISE, FILLED_NOISE = 0.3, 1.0
 """Metres that the ball may be moved from where it was measured, and where the feed has filled it in."""
 
-MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}
-"""Metres that a part may be moved from where the recording has it."""
-
-PELVIS_RANGE = (0.20, 0.64)
-"""Metres on the ground from pelvis to striking foot in measured kicks; further out or in only where the recording
-is."""
-
-OUT_OF_REACH = 0.15
-"""Metres of gap that would be left, above which the body does not try, and plays as recorded."""
-
-MOST_DROP = 0.04  # m
+MOST_MOVED = {"foot": 0.45, "hand": 0.4, "head": 0.2, "chest": 0.12}  # m from where the recording has the part
+PELVIS_RANGE = (0.20, 0.64)  # m on the ground from pelvis to striking foot in measured kicks, unless recorded further
+OUT_OF_REACH = 0.15  # m of gap that would be left, above which the body does not try, and plays as recorded
+MOST_DROP = 0.04  # m that the pelvis sinks
 _LONGEST_EASE, _SHORTEST_EASE = 0.5, 0.12  # s before and after a strike in which the body goes over
 _RISE = {"foot": 0.0, "hand": 0.0, "head": 0.6, "chest": 0.0}  # sine of the ball's elevation as seen from the part
 _IN_THE_AIR = 0.2  # m above which a ball may be met higher or lower
@@ -50,11 +56,8 @@ _ROUNDS, _CLOSE = 4, 5e-4
 
 @dataclass(frozen=True)
 class Touch:
-    """A key moment in which the ball is met.
-
-    frame: output frame, fractional. words: of the clip that plays there, sides after mirroring. entry, leave: frames
-    before and after `frame` within which the body may be changed.
-    """
+    """A key moment in which the ball is met. frame: output frame, fractional. words: of the clip that plays there,
+    sides after mirroring. entry, leave: frames before and after `frame` within which the body may be changed."""
 
     frame: float
     words: tuple[str, ...]
@@ -64,11 +67,9 @@ class Touch:
 
 @dataclass(frozen=True, eq=False)
 class Struck:
-    """What came of it. root (T, 3) m, rotations (T, J, 4) local, ball (T, 3) m.
-
-    Per touch, in the order given, NaN where the words touch no ball or there is none: gap (K,) m between the surfaces
-    at the nearest frame; ball_shift (K,) m on the ground that the ball was moved there; moved (K,) m that the part was.
-    """
+    """root (T, 3) m, rotations (T, J, 4) local, ball (T, 3) m. Per touch, in the order given, NaN where the words touch
+    no ball or there is none: gap (K,) m between the surfaces at the nearest frame; ball_shift (K,) m on the ground that
+    the ball was moved there; moved (K,) m that the part was."""
 
     root: np.ndarray
     rotations: np.ndarray
@@ -79,16 +80,8 @@ class Struck:
 
 
 def strike(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    contacts: np.ndarray,
-    ball: np.ndarray,
-    touches: Sequence[Touch],
-    fps: float,
-    *,
-    measured: np.ndarray | None = None,
-    height_known: np.ndarray | None = None,
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, contacts: np.ndarray, ball: np.ndarray,
+    touches: Sequence[Touch], fps: float, *, measured: np.ndarray | None = None, height_known: np.ndarray | None = None,
 ) -> Struck:
     """The motion and the ball's path with every touch met, as far as a body can.
 
@@ -100,9 +93,8 @@ def strike(
     windows come back bit for bit.
     """
     count = len(root)
-    everywhere = np.ones(count, bool)
-    measured = everywhere if measured is None else np.asarray(measured, bool)
-    height_known = everywhere if height_known is None else np.asarray(height_known, bool)
+    measured, height_known = (np.ones(count, bool) if flags is None else np.asarray(flags, bool)
+                              for flags in (measured, height_known))
     root, rotations, feed = (np.array(values, dtype=float) for values in (root, rotations, ball))
     path, moved = feed.copy(), np.full(len(touches), np.nan)
     touches = [_when_met(skeleton, root, rotations, feed=feed, touch=touch, fps=fps) for touch in touches]
@@ -117,7 +109,7 @@ def strike(
         root[span], rotations[span] = struck.root, struck.rotations
         places = [scene.ball_and_needs(scene.lines(struck, frame), frame)[0] for frame in moment.held]
         path = shifted(scene.ball, moment.held, np.array(places), moment.bounds, fps)
-    gap, shift = _told(skeleton, root, rotations, feed=feed, path=path, touches=touches)
+    gap, shift = _gaps_and_shifts(skeleton, root, rotations, feed=feed, path=path, touches=touches)
     return Struck(root, rotations, path, gap=gap, ball_shift=shift, moved=moved)
 
 
@@ -170,10 +162,9 @@ def _nearest(frame: float, count: int) -> int:
 def held_frames(frame: float, count: int) -> tuple[int, int]:
     """The frames, of `count`, before and after a fractional one, in which a touch is held; twice the same where it is
     nearly whole."""
-    near = _nearest(frame, count)
-    if abs(frame - near) < 0.02:
-        return near, near
-    return int(np.clip(np.floor(frame), 0, count - 1)), int(np.clip(np.ceil(frame), 0, count - 1))
+    if abs(frame - _nearest(frame, count)) < 0.02:
+        frame = _nearest(frame, count)
+    return _nearest(np.floor(frame), count), _nearest(np.ceil(frame), count)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -201,8 +192,7 @@ class _Scene:
         return np.array([body.line(part, frame - self.origin) for part in self.parts])
 
     def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Where the ball goes (3,) m at a frame, and what each part with lines (P, 2, 3) m then lacks (P, 3) m to touch
-        it."""
+        """Where the ball goes (3,) m, and what each part with lines (P, 2, 3) m then lacks (P, 3) m to touch it."""
         part, ball, room = self.parts[0], self.ball[frame], self.room(frame)
         if len(lines) == 2:
             return held_meeting(lines, part.radius, ball, room)
@@ -216,8 +206,7 @@ class _Scene:
 
 
 def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, height_known, fps: float) -> _Scene:
-    at = moment.frame - origin
-    choices = surfaces(body.skeleton, moment.words)
+    at, choices = moment.frame - origin, surfaces(body.skeleton, moment.words)
     if choices[0].part == "hand" and _together(body, choices, at, moment.words):
         parts = choices
     else:
@@ -233,18 +222,15 @@ def _scene(body: Body, moment: _Moment, origin: int, contacts, path, measured, h
                    origin=origin)
     if len(parts) == 2:
         return scene
-    def possible(need: np.ndarray) -> np.ndarray:
-        return _bounded(body, parts[0], at, need)
-
-    rise, ball, room = _RISE[parts[0].part], path[moment.frame], scene.room(moment.frame)
-    return replace(scene, aim=best_aim(line, radius, ahead, rise=rise, ball=ball, room=room, avoid=avoid,
-                                       possible=possible))
+    aim = best_aim(line, radius, ahead, rise=_RISE[parts[0].part], ball=path[moment.frame],
+                   room=scene.room(moment.frame), avoid=avoid, possible=partial(_bounded, body, parts[0], at))
+    return replace(scene, aim=aim)
 
 
 def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
     """Line and radius of the foot and the shin that do not strike."""
     other = next(part for part in part_surfaces(body.skeleton, "foot") if part.side != foot.side)
-    knee, ankle = body.places[at, list(_chain(body, other)[1:])]
+    knee, ankle = body.places[at, list(limb_chain(body.skeleton, other)[1:])]
     return [(body.line(other, at), other.radius), ((knee, ankle), other.radius)]
 
 
@@ -281,14 +267,12 @@ def _share(moment: _Moment, origin: int, count: int, standing: np.ndarray, fps: 
     least = _SHORTEST_EASE * fps
     low = max(moment.low - origin, min(lift, first - least))
     high = min(moment.high - origin, max(land, last + least))
-    frames = np.arange(count)
-    return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))
+    return eased_around(np.arange(count), low, first, last, high)
 
 
 def _velocity(body: Body, part: Surface, at: int, fps: float) -> np.ndarray:
     """(3,) m/s of the part's middle."""
-    around = slice(max(at - 1, 0), at + 2)
-    middle = np.mean(body.line(part, around), axis=0)
+    middle = np.mean(body.line(part, slice(max(at - 1, 0), at + 2)), axis=0)
     return (middle[-1] - middle[0]) * fps / max(len(middle) - 1, 1)
 
 
@@ -297,9 +281,9 @@ def _direction(body: Body, part: Surface, moment: _Moment, at: int, path: np.nda
     ball has it on the side from which it comes; head, chest and hands have it ahead."""
     angle = heading_from_positions(body.skeleton, body.places[at])
     ahead = np.array([np.cos(angle), np.sin(angle), 0.0])
-    reach = max(int(round(0.1 * fps)), 1)
-    coming = _flat(path[moment.frame] - path[max(moment.frame - reach, 0)]) / 0.1
-    leaving = _flat(path[min(moment.frame + reach, len(path) - 1)] - path[moment.frame]) / 0.1
+    near, reach = moment.frame, max(int(round(0.1 * fps)), 1)
+    coming = _flat(path[near] - path[max(near - reach, 0)]) / 0.1
+    leaving = _flat(path[min(near + reach, len(path) - 1)] - path[near]) / 0.1
     if part.part == "hand" and met_within(moment.words):
         return unit_vector(-coming, ahead)
     if part.part != "foot":
@@ -318,15 +302,13 @@ def _flat(v: np.ndarray) -> np.ndarray:
 
 
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
-    """The body with its parts at the ball, as far as they reach, and how far they were moved, m.
-
-    What is asked for and what the body makes of it are worked out in turns, since a nearly straight limb gives way
-    softly and a spine bends on an arc.
-    """
+    """The body with its parts at the ball, as far as they reach, and how far they were moved, m. What is asked for and
+    what the body makes of it are worked out in turns, since a nearly straight limb yields softly, a spine on an arc."""
     own = scene.lines(body, scene.moment.frame)
     if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:
         return body, 0.0
-    limbs, shifts, struck, lines = _carriers(body, scene.parts), np.zeros((len(scene.parts), 3)), body, own
+    limbs = [Resting.of(body, limb_chain(body.skeleton, part)) for part in scene.parts if part.part in MOST_SWING]
+    shifts, struck, lines = np.zeros((len(scene.parts), 3)), body, own
     for _ in range(_ROUNDS):
         wished = _wished(scene, body, lines, shifts)
         if np.linalg.norm(wished - shifts) < _CLOSE:
@@ -336,7 +318,11 @@ def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
     if np.linalg.norm(scene.ball_and_needs(lines, scene.moment.frame)[1], axis=1).min() > OUT_OF_REACH:
         return body, 0.0
     moved = np.linalg.norm(np.mean(lines, axis=1) - np.mean(own, axis=1), axis=1).max()
-    return _other_foot_kept(body, struck, scene.parts[0]), float(moved)
+    if not np.array_equal(struck.root, body.root):  # the pelvis has sunk, the foot that does not strike stays
+        human = identify(body.skeleton)
+        other = human.right if scene.parts[0].side == "left" else human.left
+        struck = Body.posed(body.skeleton, struck.root, foot_kept(body, other, struck.root, struck.rotations))
+    return struck, float(moved)
 
 
 def _wished(scene: _Scene, body: Body, lines: np.ndarray, shifts: np.ndarray) -> np.ndarray:
@@ -359,14 +345,13 @@ def _bounded(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarra
     shift = shift * min(1.0, MOST_MOVED[part.part] / max(np.linalg.norm(shift), 1e-9))
     if part.part == "foot":
         shift = above_ground(body, part, at, _beside_pelvis(body, part, at, shift))
-    if part.part in MOST_SWING and None not in _chain(body, part):
-        shift = swung(body, _chain(body, part), _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
+    if part.part in MOST_SWING and None not in (chain := limb_chain(body.skeleton, part)):
+        shift = swung(body, chain, _swing(body, part, at, shift), np.arange(len(body.root)) == at)[at]
     return shift
 
 
 def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.ndarray:
-    pelvis = body.places[at, identify(body.skeleton).hips]
-    middle = np.mean(body.line(part, at), axis=0)
+    pelvis, middle = body.places[at, identify(body.skeleton).hips], np.mean(body.line(part, at), axis=0)
     away = _flat(middle + shift - pelvis)
     own, wanted = np.linalg.norm(_flat(middle - pelvis)), np.linalg.norm(away)
     ranged = np.clip(wanted, min(PELVIS_RANGE[0], float(own)), max(PELVIS_RANGE[1], float(own)))
@@ -375,18 +360,10 @@ def _beside_pelvis(body: Body, part: Surface, at: int, shift: np.ndarray) -> np.
 
 def _swing(body: Body, part: Surface, at: int, shift: np.ndarray) -> Swing:
     """The limb's swing with which the part is moved by `shift` (3,) m; the pelvis sinks where its leg is too short."""
-    chain = _chain(body, part)
+    chain = limb_chain(body.skeleton, part)
     place = body.places[at, chain[2]] + shift
     lowered = _drop(body, chain, at, place) if part.part == "foot" else 0.0
     return swing_to(body, chain, at, place=place, most=MOST_SWING[part.part], lowered=lowered)
-
-
-def _chain(body: Body, part: Surface) -> tuple[int, int, int]:
-    return leg(_limb(body, part)) if part.part == "foot" else arm(_limb(body, part))
-
-
-def _limb(body: Body, part: Surface) -> Limb:
-    return getattr(identify(body.skeleton), part.side)
 
 
 def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -> float:
@@ -398,17 +375,11 @@ def _drop(body: Body, chain: tuple[int, int, int], at: int, ankle: np.ndarray) -
     return float(np.clip(hip[2] - ankle[2] - np.sqrt(max(length**2 - level**2, 0.0)), 0.0, MOST_DROP))
 
 
-def _carriers(body: Body, parts: Sequence[Surface]) -> list[Resting]:
-    """The limb of every foot or hand."""
-    limbs = [(_limb(body, part), part.part) for part in parts if part.part in ("foot", "hand")]
-    return [Resting.of(body, leg(limb) if part == "foot" else arm(limb)) for limb, part in limbs]
-
-
 def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarray) -> Body:
     """The body with each part moved by its shift (3,) m, blended by its share."""
-    part, root, rotations = scene.parts[0], body.root, body.rotations
+    root, rotations = body.root, body.rotations
     if not limbs:
-        rotations = spine_bent(body, part, scene.at, shifts[0], scene.shares[0])
+        rotations = spine_bent(body, scene.parts[0], scene.at, shifts[0], scene.shares[0])
     for part, limb, shift, share in zip(scene.parts, limbs, shifts, scene.shares):
         swing = _swing(body, part, scene.at, shift)
         moves = swung(body, limb.chain, swing, share)
@@ -418,21 +389,11 @@ def _moved(scene: _Scene, body: Body, limbs: Sequence[Resting], shifts: np.ndarr
     return Body.posed(body.skeleton, root, rotations)
 
 
-def _other_foot_kept(body: Body, struck: Body, part: Surface) -> Body:
-    """Where the pelvis has sunk, the foot that does not strike stays where it is."""
-    if np.array_equal(struck.root, body.root):
-        return struck
-    human = identify(body.skeleton)
-    limb = Resting.of(body, leg(human.right if part.side == "left" else human.left), soft=1e-3)
-    rotations = limb_carried(body, limb, np.zeros_like(body.root), struck.root, struck.rotations)
-    return Body.posed(body.skeleton, struck.root, rotations)
-
-
-def _told(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
+def _gaps_and_shifts(skeleton: Skeleton, root, rotations, feed, path, touches) -> tuple[np.ndarray, np.ndarray]:
     """Gap (K,) m and the ball's shift on the ground (K,) m at the frame nearest to each touch."""
     frames = np.array([_nearest(touch.frame, len(root)) for touch in touches], dtype=int)
     places, world = pose_kinematics(skeleton, root[frames], rotations[frames])
-    told = zip(places, world, touches, path[frames])
-    gaps = [contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in told]
+    rows = zip(places, world, touches, path[frames])
+    gaps = [contact_gap(skeleton, place, turn, touch.words, ball) for place, turn, touch, ball in rows]
     shift = np.linalg.norm((path - feed)[frames, :2], axis=1)
     return np.abs(np.array(gaps, dtype=float)), np.where(np.isfinite(gaps), shift, np.nan)

@@ -1,9 +1,9 @@
 """Dribbling: the ball is touched step by step in front of the striding feet, and rolls ahead and slows in between.
 
-What a feed has of a dribble is the ball somewhere near the player, often within him. Here the feet are left as they are
-and the ball is fitted to them: at which strides a foot touches it, from which side, and for how long it pushes it, is
-chosen by dynamic programming so that the ball is in no foot on its way, lies near its samples, and goes where the foot
-sends it. Between two touches it rolls (`roll`); at key moments it is where it was met.
+What a feed has of a dribble is the ball somewhere near the player, often within them. Here the feet are left as they
+are and the ball is fitted to them: at which strides a foot touches it, from which side, and for how long it pushes it,
+is chosen by dynamic programming so that the ball is in no foot on its way, lies near its samples, and goes where the
+foot sends it. Between two touches it rolls (`roll`); at key moments it is where it was met.
 """
 
 from __future__ import annotations
@@ -13,15 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....motion.skeleton import Skeleton
-from .dribble_search import SOONEST, Between, Push, Search
-from .legs import Legs
+from ...motion.skeleton import Skeleton
+from .dribble_search import SOONEST, Between, Legs, Push, Search
 from .meeting import lead
 
-KEY_SECONDS = 0.5
-"""Seconds from either end of a stretch within which a key moment begins or ends the dribble."""
-
-_BEYOND = 0.3  # seconds
+KEY_SECONDS = 0.5  # from either end of a stretch within which a key moment begins or ends the dribble
+_BEYOND = 0.3  # s
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +30,9 @@ class Dribbled:
 
 
 def dribble(
-    skeleton: Skeleton,
-    root: np.ndarray,
-    rotations: np.ndarray,
-    standing: np.ndarray,
-    ball: np.ndarray,
-    stretches: Sequence[tuple[float, float]],
-    held: Sequence[tuple[int, int]],
-    fps: float,
-    *,
-    measured: np.ndarray | None = None,
-    turns: Sequence[float] = (),
+    skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, ball: np.ndarray,
+    stretches: Sequence[tuple[float, float]], held: Sequence[tuple[int, int]], fps: float, *,
+    measured: np.ndarray | None = None, turns: Sequence[float] = (),
 ) -> Dribbled:
     """The ball's path with every stretch of dribbling touched step by step.
 

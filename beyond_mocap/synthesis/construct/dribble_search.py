@@ -1,4 +1,5 @@
-"""Which strides touch a dribbled ball, and how: the cheapest way from touch to touch, by dynamic programming."""
+"""Which strides touch a dribbled ball, and how: the cheapest way from touch to touch, by dynamic programming, and the
+legs as a ball meets them."""
 
 from __future__ import annotations
 
@@ -6,16 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import nearest_on
-from ....ball.roll import rolls, speeds_of
-from ....base.time_series import runs
-from ....motion.track import BALL_RADIUS
-from .legs import SLOW, Legs
+from ...annotation.striking import Surface, nearest_on, part_surfaces
+from ...ball.roll import rolls, speeds_of
+from ...base.time_series import runs
+from ...motion.humanoid import heading_from_positions, identify
+from ...motion.motion import pose_kinematics
+from ...motion.skeleton import Skeleton
+from ...motion.track import BALL_RADIUS, zero_phase_hann
+from .carry import foot_tip
 from .meeting import touching_places
 
-SOONEST, _LATEST = 0.2, 1.3
-"""Seconds from one touch to the next."""
-
+SOONEST, _LATEST = 0.2, 1.3  # s from one touch to the next
 _ANGLES = np.radians([0.0, 35.0, -35.0, 65.0, -65.0])
 _ALONG = 0.7  # share of the way from ankle to toes from which the ball is touched
 _RETURNING, _BEHIND = -0.5, 0.0  # m/s against the body, and metres ahead of it, that a foot needs at least to touch it
@@ -40,6 +42,10 @@ _LEAST_EXTRA = 0.5  # m/s that it may leave slower, since a foot slows within a 
 _KEPT = 6  # pushes of a swing from which the ball may roll on
 _START = -1
 
+SHIN_RADIUS, TIP_RADIUS = 0.05, 0.0  # m about the lines of a shin and of the toes' tip, which the ball keeps out of
+SLOW = 0.6  # m/s below which a body hardly goes anywhere
+_ROUNDS, _CLOSE = 6, 5e-4
+
 
 @dataclass(frozen=True)
 class Push:
@@ -59,6 +65,80 @@ class Between:
     high: int
     starts: bool
     ends: bool
+
+
+class Legs:
+    """A body over W frames, from its root (W, 3) m and local rotations (W, J, 4).
+
+    feet: their striking surfaces, left and right; lines: both ends (W, 3) m of each. pelvis (W, 2) m; velocity (W, 2)
+    m/s and speed (W,) of it without the sway of steps; ahead (W, 2): unit, where it goes, or faces where it hardly
+    goes.
+    """
+
+    def __init__(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float):
+        places, world = pose_kinematics(skeleton, root, rotations)
+        body, self.fps = identify(skeleton), fps
+        self.pelvis = places[:, body.hips, :2]
+        self.feet: tuple[Surface, ...] = part_surfaces(skeleton, "foot")
+        self.lines = [foot.line(places, world) for foot in self.feet]
+        solid = [(line, foot.radius) for line, foot in zip(self.lines, self.feet)]
+        for limb in (body.left, body.right):
+            solid.append(((places[:, limb.lower_leg], places[:, limb.foot]), SHIN_RADIUS))
+            solid.append((foot_tip(skeleton, limb, places, world), TIP_RADIUS))
+        self.start = np.stack([line[0] for line, _ in solid], axis=1)  # (W, 6, 3)
+        self.along = np.stack([line[1] for line, _ in solid], axis=1) - self.start
+        self.squared = np.maximum(np.sum(self.along**2, axis=-1), 1e-12)
+        self.least = np.array([radius for _, radius in solid]) + BALL_RADIUS
+        self.velocity = _smooth_velocity(self.pelvis, fps)
+        self.speed = np.linalg.norm(self.velocity, axis=1)
+        angle = heading_from_positions(skeleton, places)
+        facing = np.column_stack([np.cos(angle), np.sin(angle)])
+        going = self.velocity / np.maximum(self.speed, 1e-9)[:, None]
+        self.ahead = np.where((self.speed > SLOW)[:, None], going, facing)
+
+    def foot_velocity(self, side: int) -> np.ndarray:
+        """(W, 2) m/s of the foot's middle."""
+        middle = np.mean(self.lines[side], axis=0)[:, :2]
+        return np.gradient(middle, axis=0) * self.fps
+
+    def gaps(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """(N,) m between balls (N, 3) m at frames (N,) and the nearest part of the body, negative within it."""
+        return np.min(self._away(balls, frames)[1], axis=1)
+
+    def kept_out(self, path: np.ndarray, free: np.ndarray) -> np.ndarray:
+        """A ball's path (W, 3) m led around the body where it is `free` (W,) bool to go elsewhere."""
+        every, aside, free = np.arange(len(path)), np.zeros((len(path), 2)), free[:, None]
+        for left in reversed(range(_ROUNDS)):
+            out = self.way_out(path + np.pad(aside, ((0, 0), (0, 1))), every) * free
+            if np.abs(out).max(initial=0.0) < _CLOSE:
+                break
+            aside += out
+            if left:
+                padded = np.pad(aside, ((1, 1), (0, 0)), mode="edge")
+                aside = free * (0.25 * padded[:-2] + 0.5 * aside + 0.25 * padded[2:])
+        return path + np.pad(aside, ((0, 0), (0, 1)))
+
+    def way_out(self, balls: np.ndarray, frames: np.ndarray) -> np.ndarray:
+        """(N, 2) m along the ground by which balls (N, 3) m come out of the part of the body that they are deepest
+        in."""
+        away, gaps = self._away(balls, frames)
+        rows, part = np.arange(len(balls)), np.argmin(gaps, axis=1)
+        way, level = away[rows, part], np.linalg.norm(away[rows, part, :2], axis=1)
+        wanted = np.sqrt(np.maximum(self.least[part] ** 2 - way[:, 2] ** 2, 0.0))
+        return way[:, :2] * (np.maximum(wanted - level, 0.0) / np.maximum(level, 1e-6))[:, None]
+
+    def _away(self, balls: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From the nearest points of all parts to the balls (N, 6, 3) m, and the gaps (N, 6) m."""
+        start, along = self.start[frames], self.along[frames]
+        to = balls[:, None] - start
+        share = np.clip(np.einsum("npk,npk->np", to, along) / self.squared[frames], 0.0, 1.0)
+        to -= share[..., None] * along
+        return to, np.sqrt(np.einsum("npk,npk->np", to, to)) - self.least
+
+
+def _smooth_velocity(places: np.ndarray, fps: float) -> np.ndarray:
+    """(W, 2) m/s without the sway of steps."""
+    return np.gradient(zero_phase_hann(places, fps, 0.6), axis=0) * fps if len(places) > 2 else np.zeros_like(places)
 
 
 class Search:
@@ -108,7 +188,7 @@ class Search:
 
     def _swings(self, side: int) -> list[tuple[int, int, int, int]]:
         """(first, end, number, 0) of every swing of a foot, and (frame, frame + 1, number, 1) of the moments in which a
-        foot of somebody who hardly moves may touch the ball as it stands."""
+        foot of a player who hardly moves may touch the ball as it stands."""
         air = [(first, end, 2 * number + side, 0) for number, (first, end) in enumerate(runs(~self.standing[:, side]))]
         step = max(int(_STANDING_STEP * self.fps), 1)
         still = [f for f in range(0, self.count, step) if self.standing[f, side] and self.body.speed[f] < SLOW]
@@ -184,13 +264,16 @@ class Search:
     def _push(self, node: int) -> None:
         """The cheapest way for the ball to be at this foot: rolled here, or pushed here since a few frames."""
         longest = int(_PUSH_SECONDS * self.fps)
-        same = (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
         ago = self.frame[node] - self.frame
-        since = np.flatnonzero(same & (ago >= 0) & (ago <= longest))[::-1]
+        since = np.flatnonzero(self._alike(node) & (ago >= 0) & (ago <= longest))[::-1]
         since = since[ago[since] == np.arange(len(since))]  # without a frame between
         costs = self.into[since] + np.cumsum(self.held[since]) + self.touch[node]
         best = int(np.argmin(costs))
         self.out[node], self.pushed[node] = costs[best], since[best]
+
+    def _alike(self, node: int) -> np.ndarray:
+        """(N,) bool: nodes with the foot, the swing and the side of the ball of this one."""
+        return (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
 
     def _sources(self, frame: int) -> np.ndarray:
         """The nodes from which the ball may roll so as to be somewhere at a frame: within _LATEST, or the last ones."""
@@ -274,9 +357,7 @@ class Search:
         """The cheapest way, back from its end."""
         path = np.array(self.feed)
         last = self.count - 1 if self.part.ends else int(self.frame[self.last])
-        to, there, node, first = last, self.feed[-1], self.last, 0
-        if not self.part.ends:
-            to, there = None, None
+        node, (to, there) = self.last, (last, self.feed[-1]) if self.part.ends else (None, None)
         while True:
             frame = 0 if node == _START else int(self.frame[node])
             place = self.feed[0] if node == _START else self.place[node]
@@ -286,10 +367,9 @@ class Search:
             if node == _START:
                 return 0, last, path[: last + 1]
             entered = int(self.pushed[node])
-            swing = (self.side == self.side[node]) & (self.angle == self.angle[node]) & (self.swing == self.swing[node])
-            held = np.flatnonzero(swing & (self.frame >= self.frame[entered]) & (self.frame <= frame))
-            path[self.frame[held]] = self.place[held]
             first = int(self.frame[entered])
+            held = np.flatnonzero(self._alike(node) & (self.frame >= first) & (self.frame <= frame))
+            path[self.frame[held]] = self.place[held]
             self.pushes.insert(0, Push(first, frame, ("left", "right")[self.side[node]]))
             to, there = first, self.place[entered]
             node = int(self.came[entered])

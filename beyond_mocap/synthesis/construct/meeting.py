@@ -1,5 +1,4 @@
-"""Where ball and body meet: where the ball goes within its noise, how far the body still is from it, and the ball's
-path."""
+"""Where ball and body meet: where the ball goes within its noise, how far the body is from it, and the ball's path."""
 
 from __future__ import annotations
 
@@ -8,15 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....annotation.striking import ball_gap, nearest_on
-from ....base.easing import quintic_step_by_powers
-from ....base.vectors import unit_vectors
-from ....motion.quaternion import turned_about_up
-from ....motion.track import BALL_RADIUS
+from ...annotation.striking import ball_gap, nearest_on
+from ...base.easing import quintic_step_by_powers
+from ...base.vectors import unit_vectors
+from ...motion.quaternion import turned_about_up
+from ...motion.track import BALL_RADIUS
 
-BALL_SECONDS = 0.3
-"""Seconds before and after a key moment over which the ball's shift grows and fades."""
-
+BALL_SECONDS = 0.3  # before and after a key moment over which the ball's shift grows and fades
 _SLACK = 0.06  # metres that the ball may be above or below where the part would strike it squarely
 _ANGLES = np.radians([0.0, 20.0, -20.0, 40.0, -40.0, 60.0, -60.0])  # about the vertical, tried
 _ALONG = (0.5, 0.2, 0.8)
@@ -56,14 +53,8 @@ class Meeting:
 
 
 def best_aim(
-    line: Line,
-    radius: float,
-    direction: np.ndarray,
-    rise: float,
-    ball: np.ndarray,
-    room: Room,
-    avoid: Sequence[tuple[Line, float]],
-    possible: Callable[[np.ndarray], np.ndarray],
+    line: Line, radius: float, direction: np.ndarray, rise: float, ball: np.ndarray, room: Room,
+    avoid: Sequence[tuple[Line, float]], possible: Callable[[np.ndarray], np.ndarray],
 ) -> Aim:
     """The aim that asks least of the body, of those within 60 degrees of `direction`: inside, instep, outside.
 
@@ -90,12 +81,7 @@ def best_aim(
 
 
 def meetings(
-    line: Line,
-    radius: float,
-    aims: Sequence[Aim],
-    rise: float,
-    ball: np.ndarray,
-    room: Room,
+    line: Line, radius: float, aims: Sequence[Aim], rise: float, ball: np.ndarray, room: Room,
     avoid: Sequence[tuple[Line, float]] = (),
 ) -> Meeting:
     """Ball and part meet as aimed, by each of N aims: the ball moves as far as it may and out of what it is to avoid,
@@ -114,8 +100,7 @@ def meetings(
     away = touching[:, :2] - ball[:2]
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)
     for other, own in avoid:
-        out = (places - nearest_on(other, places))[:, :2]
-        out = unit_vectors(out)
+        out = unit_vectors((places - nearest_on(other, places))[:, :2])
         places[:, :2] += np.maximum(-ball_gap(other, own, places), 0.0)[:, None] * out
         places[:, :2] = ball[:2] + _within(places[:, :2] - ball[:2], level)
     return Meeting(places, places - touching + lift)
@@ -146,8 +131,7 @@ def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room)
     level = np.sqrt(max(room.whole**2 - (height - ball[2]) ** 2, 0.0))
     away = middle[:2] - ball[:2]
     place = np.array([*(ball[:2] + away * min(1.0, level / max(np.linalg.norm(away), 1e-12))), height])
-    out = places - middle
-    out = unit_vectors(out)
+    out = unit_vectors(places - middle)
     return place, place + (radius + BALL_RADIUS) * out - places
 
 
@@ -171,7 +155,7 @@ def shifted(
     reach = BALL_SECONDS * fps
     low, high = max(held[0] - reach, bounds[0]), min(held[1] + reach, bounds[1])
     frames = np.arange(max(int(np.ceil(low)), 0), min(int(high), len(ball) - 1) + 1)
-    share = eased((frames - low) / max(held[0] - low, 1e-9), (high - frames) / max(high - held[1], 1e-9))
+    share = eased_around(frames, low, *held, high)
     ends = places - ball[list(held)]
     out = ball.copy()
     out[frames] += share[:, None] * np.where(frames[:, None] <= held[0], ends[0], ends[1])
@@ -192,9 +176,8 @@ def led(ball: np.ndarray, held: tuple[int, int], places: np.ndarray, bounds: tup
 def lead(ball: np.ndarray, frame: int, anchor: int, shift: np.ndarray) -> np.ndarray:
     """The ball's path (T, 3) m moved by `shift` (3,) m at `frame`, by nothing at `anchor` and beyond, and evenly less
     in between. Its height is what it was as soon as it comes to the ground."""
-    between = np.arange(frame, anchor, 1 if anchor > frame else -1)
+    between, out = np.arange(frame, anchor, 1 if anchor > frame else -1), ball.copy()
     between = between[(between >= 0) & (between < len(ball))]
-    out = ball.copy()
     if not len(between):
         return out
     away = np.abs(between - frame)
@@ -210,3 +193,8 @@ def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
     """0 .. 1 .. 0, twice continuously differentiable: rising and falling (N,) are the straight ramps, 1 and more
     inside."""
     return quintic_step_by_powers(np.minimum(rising, falling))
+
+
+def eased_around(frames: np.ndarray, low: float, first: float, last: float, high: float) -> np.ndarray:
+    """0 .. 1 .. 0, twice continuously differentiable: 1 in frames first .. last, 0 up to `low` and from `high` on."""
+    return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))
