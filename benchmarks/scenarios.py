@@ -55,7 +55,8 @@ def of_library(name: str, place: Path) -> list[str]:
     took = [20.0 * report["seconds"]["total"] / report["duration_s"] for report in reports.values()]
     return [f"### Library {name}", "", f"- library: {cold:.2f} s from text, {warm:.2f} s from its cache",
             f"- {np.mean(took):.2f} s for 20 s of motion (target 0.5), {max(took):.2f} at most",
-            f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "", *edit_times(library, map(scenario, NUMBERS)), ""]
+            f"- {effort.peak_memory(name, folder, cache)}", "", *figures(reports), "",
+            *edit_times(library, map(scenario, NUMBERS)), ""]
 
 
 def report_of(library: Library, number: int) -> dict:

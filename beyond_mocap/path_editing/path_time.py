@@ -229,7 +229,7 @@ class Ending:
     (S,): output frames at which the motion begins anew; told: lines for the user."""
 
     count: int
-    take_rows: np.ndarray
+    shown: np.ndarray
     again: np.ndarray
     told: tuple[str, ...] = ()
 
