@@ -1,9 +1,10 @@
 """The feet of a motion that rides another path: held where they stand, on level ground or any other.
 
-As `foot_plant`, with three differences. The ground may rise and tip (`underfoot`): feet keep the height above it that
-they had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both feet.
-A leg that is asked to be straighter than it was nears its full length gently, the same in the air and on the ground, so
-that no knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are dragged.
+As `foot_plant`, with three differences. The ground may rise and tip (`ground_contact`): feet keep the height above it
+that they had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both
+feet. A leg that is asked to be straighter than it was nears its full length gently, the same in the air and on the
+ground, so that no knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are
+dragged.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
-"""The ball solved from samples: touches, the path between them, and where play ends.
+"""The ball solved from samples: touches, the path between them, and where play ends; `solve_ball` is the recipe for a
+match or one player's track.
 
-1. `samples`: what the feed filled in, what is wrong, how far the rest scatters.
-2. `cuts`: all places where the course may change. 3. `touches`: which of them are touches, which are none, in one
-search that weighs how the velocity changes against who is near. 4. `who`: one chain of players. 5. `kinds`, `ends`.
+1. `samples`: what the feed filled in, what is wrong, how far the rest scatters. 2. `pieces`: all places where the
+course may change. 3. `touches`: which of them are touches, which are none, in one search that weighs how the velocity
+changes against who is near; then one chain of players. 4. `kinds`: what each touch was, and where play ends.
 """
 
 from __future__ import annotations
