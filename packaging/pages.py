@@ -1,5 +1,5 @@
 """Pages made from the code: docs/settings.md from the table of settings, and the tables of providers in
-docs/match/match-input.md from their records. `python packaging/pages.py` in the project's folder writes both."""
+docs/match/match-input.md from their records. `make tables` in the project's folder writes both."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ PROVIDERS_PAGE = TOP / "docs" / "match" / "match-input.md"
 HEAD = """# Settings
 
 All settings, by feature. This page is made from the table in `beyond_mocap/base/settings` by
-`python packaging/pages.py`; a test checks that it is up to date. Options are those of the command line, panel
+`make tables`; a test checks that it is up to date. Options are those of the command line, panel
 names those in Blender. Files and objects that are only read or written are on the feature's own page.
 """
 COLUMNS = ("setting", "option", "in Blender", "default", "limits", "meaning")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def add_throw(verbs):
     verb = verbs.add_parser("throw", help="throws and kicks from networks: train, synthesize, evaluate, examples")
-    return add_own_verbs(verb, "throw_verb", _add_train, _add_synthesize, _add_evaluate, _add_examples)
+    return add_own_verbs(verb, "throw_verb", *(_add_train, _add_synthesize, _add_evaluate, _add_examples))
 
 
 def _add_train(verbs):

@@ -116,7 +116,8 @@ def _library(order: MatchOrder, report: Progress, cancelled) -> tuple[Library, L
     library = build(order.library, cache_dir=order.cache, skeleton=order.skeleton, unit=order.unit, seed=order.seed,
                     progress=report, cancelled=cancelled)
     library.extended  # worked out once, here, instead of by every worker  # noqa: B018
-    source = LibrarySource(order.library, order.cache, order.skeleton, order.unit, order.seed, library.kept[1])
+    source = LibrarySource(order.library, order.cache, skeleton=order.skeleton, unit=order.unit, seed=order.seed,
+                           key=library.kept[1])
     hold(source, library)
     return library, source
 

@@ -33,7 +33,7 @@ def hooks_in(path, text):
 def test_nothing_else_hooks_into_blender():
     paths = [TOP / "__init__.py", TOP / "batch.py", *(path for name in FOLDERS for path in (TOP / name).rglob("*.py"))]
     found = [line for path in paths for line in hooks_in(path.relative_to(TOP).as_posix(), path.read_text("utf-8"))]
-    assert len(paths) > 200 and found == []
+    assert len(paths) > 150 and found == []
 
 
 @pytest.mark.parametrize("text", [
