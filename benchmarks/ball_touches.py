@@ -264,8 +264,7 @@ def read_touches(path: str | os.PathLike, match: str) -> Reading:
     """The reading of one match from a CSV of match,row,time_s,until_s,player,part,word,note.
 
     row: "stretch", "touch" or "unsure" (a doubt). player: one id, or several with | between where one of them it was.
-    InputError for other columns or rows, and a match that is not in it.
-    """
+    InputError for other columns or rows, and a match that is not in it."""
     with open(path, newline="", encoding="utf-8") as file:
         rows = csv.DictReader(file)
         if tuple(rows.fieldnames or ()) != _COLUMNS:

@@ -24,8 +24,7 @@ def seconds(work, runs: int = RUNS) -> tuple[float, object]:
     """The best of several runs, and what the last one returned.
 
     Seconds of the processor: with one thread on one core they are what a clock shows while nothing else runs, and they
-    stay so where something does.
-    """
+    stay so where something does."""
     best, result = np.inf, None
     for _ in range(runs):
         begun = time.process_time()
@@ -67,8 +66,7 @@ def bvh_speed() -> str:
 def library_speed() -> str:
     """150 clips of 120 frames at 30 fps, the mirrored counted, from text to clusters and from the cache.
 
-    Made of the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 twins.
-    """
+    Made of the Bandai clips, cut or repeated to 120 frames: 75 files and their 75 twins."""
     sources = sorted((DATA / "mocap" / "bandai").glob("*.bvh"))
     with tempfile.TemporaryDirectory() as folder:
         rows = ["file,start_frame,end_frame,key_frame,labels"]

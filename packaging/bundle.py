@@ -55,8 +55,7 @@ def wheel(filename):
     """Take a wheel's file name apart.
 
     >>> wheel("lxml-6.1.3-cp311-cp311-win_amd64.whl").platforms
-    frozenset({'win_amd64'})
-    """
+    frozenset({'win_amd64'})"""
     name, version, *_, python, abi, platform = filename.removesuffix(".whl").split("-")
     return Wheel(plain(name), version, *(frozenset(tags.split(".")) for tags in (python, abi, platform)))
 

@@ -33,8 +33,7 @@ BALL_RADIUS = 0.11
 @dataclass(frozen=True)
 class Actor:
     """Who is drawn: a motion on the pitch, the colours of the shirt, and how to skin it (made from the skeleton if
-    None).
-    """
+    None)."""
 
     motion: Motion
     colours: dict | None = None

@@ -38,8 +38,7 @@ class TrainingConfig:
     linear_start: whether networks start from what linear regression says, else at random. ridge: of that regression, a
     row; 0: chosen on examples that are left out for it. start_noise: radians by which joints are off in a copy of all
     frames that regression sees too (`disturbed`); 0: none. examples: most that the model keeps to start from (§7.7.1).
-    seed: of first weights, order, dropout and noise.
-    """
+    seed: of first weights, order, dropout and noise."""
 
     settings: ModelSettings = field(
         default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True, carried=True)
@@ -80,8 +79,7 @@ def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
     """The training that a JSON file describes, what it leaves out by default; without a file the default.
 
     changes: values that stand above the file's, None where there is none. InputError, one line: no such file, no JSON,
-    an unknown name, a value out of its range.
-    """
+    an unknown name, a value out of its range."""
     told = {}
     if path is not None:
         told = values.object_of(utf8(Path(path), "a training's config", LARGEST), str(path), PAGE)

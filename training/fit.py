@@ -41,8 +41,7 @@ def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
     """Stretches (N, 2) of `frames` steps, (example, first frame), shuffled.
 
     lengths: frames of each example. Stretches lie end to end from a random frame on, so that within an epoch nearly
-    every frame is predicted once; examples too short for one are left out. Seed and epoch alone decide.
-    """
+    every frame is predicted once; examples too short for one are left out. Seed and epoch alone decide."""
     rng = np.random.default_rng([seed, epoch])
     rows = []
     for example, length in enumerate(lengths):
@@ -100,8 +99,7 @@ def fit(
     """Trains a problem. checkpoint: where one is written after each macro-epoch and when cancelled. resume: from there.
 
     InputError where no example is long enough, where the checkpoint is of another training, or where the loss is no
-    number any more; Cancelled when asked to stop.
-    """
+    number any more; Cancelled when asked to stop."""
     adam = optax.chain(_clipped(), optax.scale_by_adam())
     params = problem.first(jax.random.key(config.seed))
     state = (params, adam.init(params))
@@ -222,8 +220,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
     """The checkpoint at `path`, whose state has the form of the tree `like`.
 
-    InputError, one line: missing, damaged, of another version, or of a training with other settings or recordings.
-    """
+    InputError, one line: missing, damaged, of another version, or of a training with other settings or recordings."""
     check_checkpoint(path)
     try:
         with np.load(path, allow_pickle=False) as file:

@@ -96,8 +96,7 @@ def linear_start(told: Sums, ridge: float) -> Linear:
     """The linear answer, whose weights glide with the phase, that comes nearest, by ridge regression.
 
     With one control point that is y = W x + b. With several it is y = sum_k theta_k ((W + D_k) x + b_k): what is common
-    to all phases and what is not are kept small alike, so that no control point strays where it has few frames.
-    """
+    to all phases and what is not are kept small alike, so that no control point strays where it has few frames."""
     count, out = told.products.shape
     shares = 1 if told.points == 1 else told.points + 1
     weight = np.ones((shares, count // shares))

@@ -47,8 +47,7 @@ def train(
     """A model trained on examples of one skeleton, at the config's rate.
 
     checkpoint: where one is kept, and found with `resume`. minutes: stop then with what stands. InputError: no example,
-    different skeletons or rates, a checkpoint of another training; Cancelled where asked to stop.
-    """
+    different skeletons or rates, a checkpoint of another training; Cancelled where asked to stop."""
     _check(examples, config)
     settings = config.settings
     chains = shared_chains(examples)

@@ -67,8 +67,7 @@ def aim(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.ndarray |
     possible. near (B, 3) m/s: a launch close to the one wanted (the last one, while a target is dragged); rows of it
     that are not finite are not used. about (B,) s: where the time is free, it is looked for near to these. Any of
     start, target, spin may be (3,): the same for all. Starts and targets lower than a ball can lie are set onto the
-    ground. InputError: numbers that cannot be meant.
-    """
+    ground. InputError: numbers that cannot be meant."""
     problem = _Problem.of(start, target, ball, seconds=seconds, bounces=bounces, spin=spin, ground=ground)
     if seconds is None:
         problem = problem.at_time(_chosen_times(problem, loft, about))
@@ -93,8 +92,7 @@ def along_ground(start: np.ndarray, target: np.ndarray, ball: Ball, seconds: np.
     """Level launches from `start` (B, 3) m for balls that slide and roll to where `target` (B, 3) m lies on the ground.
 
     seconds (B,) or a number; None: so that they still have `arrives` m/s there. A start over the ground is set onto it.
-    InputError as `aim`.
-    """
+    InputError as `aim`."""
     problem = _Problem.of(start, target, ball, seconds=seconds, bounces=0, spin=None, ground=ground)
     low = ground + ball.radius
     problem.start[:, 2], problem.target[:, 2] = low, low
@@ -248,8 +246,7 @@ def _newton(problem: _Problem, guess: np.ndarray) -> tuple[np.ndarray, np.ndarra
     asked.
 
     The slopes of eq. 7 are taken from launches beside the first one and kept up by what each step shows (Broyden's
-    rule); where that no longer helps they are taken anew, and an aim that still does not come nearer is given up.
-    """
+    rule); where that no longer helps they are taken anew, and an aim that still does not come nearer is given up."""
     velocity = guess / np.maximum(length(guess) / FASTEST_TRIED, 1.0)[:, None]
     short, miss = _short(problem, velocity)
     slope = np.empty((len(guess), 3, 3))

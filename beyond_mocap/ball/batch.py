@@ -78,8 +78,7 @@ def states(position: np.typing.ArrayLike, velocity: np.ndarray, spin: np.ndarray
     """Positions (B, 3) m and velocities (B, 3) m/s of balls, each `seconds` (B,) after its launch (one number: all
     alike).
 
-    position, velocity, spin: (B, 3), or (3,) for all alike; spin None: none.
-    """
+    position, velocity, spin: (B, 3), or (3,) for all alike; spin None: none."""
     balls = after(launched(position, velocity, spin, ball, ground), ball, seconds, ground)
     return balls.position, balls.velocity
 

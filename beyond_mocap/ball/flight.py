@@ -54,8 +54,7 @@ class Flight:
     """The way of a ball. Before its launch it lies at the start, after `end` it stays where it is then.
 
     pieces in order of time. bounces (K,) s: when it met the ground and left it again. rolls_from, rests_from: s, None
-    where it never does. end: s, up to when it was followed. launch, ball: what was asked.
-    """
+    where it never does. end: s, up to when it was followed. launch, ball: what was asked."""
 
     launch: Launch
     ball: Ball
@@ -102,8 +101,7 @@ def fly(launch: Launch, ball: Ball, seconds: float, ground: float = 0.0, landing
     """The way of a ball for `seconds` after its launch over level ground at height `ground` m (eq. 6).
 
     landing: it ends where the ball first comes down, where that is before. A ball launched lower than it can lie is set
-    onto the ground. InputError: seconds that are no time.
-    """
+    onto the ground. InputError: seconds that are no time."""
     if not 0.0 <= seconds < np.inf:
         raise InputError("flight", f"{seconds} seconds", "a time of 0 s or more")
     flight = _Integrator(launch, ball, launch.time + max(float(seconds), 1e-9), ground + ball.radius)
@@ -285,8 +283,7 @@ def meet_wall(position: np.ndarray, velocity: np.ndarray, ball: Ball, foot: np.n
     where that comes first, and where it is after 6 s or four times what it would take without air where neither does.
 
     position (3,) m, velocity (3,) m/s, spin (3,) rad/s: the launch. foot (2,) m: a point of the wall on the ground,
-    ahead (2,): from where it is thrown towards it, the wall's normal.
-    """
+    ahead (2,): from where it is thrown towards it, the wall's normal."""
     unhindered = np.hypot(*(foot - position[:2])) / max(np.hypot(*velocity[:2]), 1e-9)
     free = position[2] > ball.radius or velocity[2] > LEAST_HOP  # else it bounces as it is launched
     flight = fly(Launch(0.0, position, velocity, spin), ball, min(_LONGEST_TO_WALL, 0.5 + 4.0 * unhindered),

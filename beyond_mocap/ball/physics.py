@@ -107,8 +107,7 @@ def in_air(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> np.ndarray:
 def bounced(velocity: np.ndarray, spin: np.ndarray, ball: Ball) -> tuple[np.ndarray, np.ndarray]:
     """Velocity and spin (..., 3) after meeting level ground with those given: the impulse of eq. 5.
 
-    The push across is at right angles to Z and turns the ball; at most it brings the lowest point to a stop.
-    """
+    The push across is at right angles to Z and turns the ball; at most it brings the lowest point to a stop."""
     down = np.maximum(-velocity[..., 2], 0.0)
     push = _across(velocity, spin, ball, ball.friction * (1.0 + ball.restitution) * down)
     after = velocity + push
@@ -136,8 +135,7 @@ def sliding(velocity: np.ndarray, spin: np.ndarray, ball: Ball,
     """Accelerations (..., 3) m/s^2 and rad/s^2 of balls that slide over the ground.
 
     ahead (..., 3): where the lowest point went at first; the push stays against it when the slip has turned about, so
-    that an integrator that looks past the end of the slide finds the same law there.
-    """
+    that an integrator that looks past the end of the slide finds the same law there."""
     over = slip(velocity, spin, ball)
     if ahead is not None:
         over = over * np.where(np.sum(over * ahead, axis=-1) < 0.0, -1.0, 1.0)[..., None]

@@ -90,8 +90,7 @@ def shoot(strikes: Strikes, target: np.ndarray, ball: Ball, seconds: np.ndarray 
 
     seconds (N,) from each frame on, or one number; None: the slowest launch. turns: back spin and spin to the left,
     turns a second. ground: it goes along the ground; else after so many bounces. near: the launches of a shot like it,
-    to begin with. InputError where no frame has one that is possible within `fastest` m/s; `what` is named there.
-    """
+    to begin with. InputError where no frame has one that is possible within `fastest` m/s; `what` is named there."""
     target = np.asarray(target, float)
     way = target - 0.5 * (strikes.start + strikes.end)
     towards = way + length(way)[:, None] * [0.0, 0.0, RISE] if near is None else near.velocity

@@ -48,8 +48,7 @@ class Cancelled(BeyondMocapError):
 class TimedLine(str):
     """A line of a report, with the seconds it is about, so that whoever shows it can go there.
 
-    spans: (first, last) seconds on the track's clock, in the order of the line; () where it is about no time.
-    """
+    spans: (first, last) seconds on the track's clock, in the order of the line; () where it is about no time."""
 
     spans: tuple[tuple[float, float], ...]
 

@@ -240,8 +240,7 @@ def eq18(asked: Iterable[str], played: Iterable[str]) -> float:
     """Faustino eq. 18 for one frame as printed: -1 all words alike .. 1 none, NaN where neither has a word.
 
     With 1 for a present and -1 for an absent word, the products over words that either frame has, negated, over their
-    number r: one word in common counts -1, one that only one of them has counts +1.
-    """
+    number r: one word in common counts -1, one that only one of them has counts +1."""
     asked, played = set(asked), set(played)
     either = asked | played
     return (len(asked ^ played) - len(asked & played)) / len(either) if either else np.nan

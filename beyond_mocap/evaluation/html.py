@@ -53,8 +53,7 @@ def html_report(
 ) -> str:  # fmt: skip
     """The page as text. played, track, timeline and library: what `report` (of `evaluate_played`) was made from.
 
-    Raises InputError where matplotlib is not installed, or the library has another skeleton than the motion.
-    """
+    Raises InputError where matplotlib is not installed, or the library has another skeleton than the motion."""
     plots.require_matplotlib()
     view = View(played, track, timeline, library)
     over_time = build_image(plots.curves(view), "distance from the track, toe heights, speed, smoothness")

@@ -24,8 +24,7 @@ class PerFrame:
     times (T,) s on the track's clock. track (T, 2) m: where the measured track is. root_error, pelvis_error (T,) m.
     slide (T, 2) m/s: speed of each foot (left, right) over the ground while it stands. correction (T, 2) m by which
     polish moved each foot. jerk (T,): the largest within +-8 frames, over the 95th percentile of recordings at that
-    speed. speed, asked_speed (T,) m/s behind a 1 s window.
-    """
+    speed. speed, asked_speed (T,) m/s behind a 1 s window."""
 
     times: np.ndarray
     track: np.ndarray

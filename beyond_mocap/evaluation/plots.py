@@ -114,8 +114,7 @@ def strip(view: View, frames: Sequence[int], marked: int | None = None) -> bytes
     """Stick figures side by side, seen from the body's left side and a little from ahead; left blue, right red.
 
     frames: output frames, drawn in their order; marked: the one whose number is bold. The ball is drawn where it is
-    near.
-    """
+    near."""
     middle = frames[len(frames) // 2]
     facing = float(heading_from_positions(view.played.motion.skeleton, view.played.positions[middle]))
     turn = about_up(np.array(-facing + np.radians(20.0)))

@@ -41,8 +41,7 @@ def pose_features(skeleton: Skeleton, positions: np.ndarray, fps: float, hips: i
     sqrt(J).
 
     Velocities are the world's, turned into the heading frame, so travel counts. The Euclidean distance of two rows is
-    then the root mean square over joints.
-    """
+    then the root mean square over joints."""
     places = local_positions(skeleton, positions, hips)
     moves = turned(time_derivative(positions, fps), -heading_from_positions(skeleton, positions)) * VELOCITY_SECONDS
     both = np.concatenate([places, moves], axis=1).reshape(len(positions), -1)
@@ -62,8 +61,7 @@ def nearest_distance(
 
     left_out (T,), owner (N,): where given, library rows whose owner equals a feature row's left_out do not count;
     infinite where none is left. Exhaustive, in chunks; |a-b|^2 = |a|^2 - 2ab + |b|^2 loses about 1e-3 m in float32 near
-    zero.
-    """
+    zero."""
     squares = np.einsum("nd,nd->n", library, library)
     out = np.empty(len(features))
     for start in range(0, len(features), _ROWS_AT_ONCE):
@@ -96,8 +94,7 @@ def smoothness(skeleton: Skeleton, positions: np.ndarray, fps: float) -> np.ndar
     The features are those of his §3.2: position, velocity and acceleration of all joints seen from the root, in the
     scale of `library.features`. He reduces them by PCA to 98 % of their energy, which leaves the curve as it is
     (on a take from five folders of recordings 96 % of its height, correlation 0.999); here nothing is reduced, so that
-    a motion has one curve, whatever library it comes from.
-    """
+    a motion has one curve, whatever library it comes from."""
     joints = feature_joints(skeleton)
     facing = np.unwrap(heading_from_positions(skeleton, positions))
     return np.linalg.norm(np.diff(raw_features(positions[:, joints], facing, fps), axis=0), axis=-1)

@@ -41,8 +41,7 @@ class Recording:
     features (T, 6 J) float32 m, of `realism.pose_features`. sway, surge, speed (T,): m, m/s, m/s. contact_speed (T, 2)
     m/s, NaN without contact. skating (T,) bool. heel_rest: height of its heel joint on a flat foot, m. support (T, 2)
     m. tip (T,) m. jerk (T-3,) m/s^3. smoothness (T,) m from each frame to the next, NaN at the end. stances (S, 3) of
-    its own frames and their travel (S,) m.
-    """
+    its own frames and their travel (S,) m."""
 
     path: str
     rate: float
@@ -69,8 +68,7 @@ class LibraryReference:
     per-frame arrays are Recording's, joined; jerk_above_real (N,): 1 where the window around a frame is above jerk_p95,
     NaN at a clip's ends. Speed classes are `movement.speed_class`'s: jerk_p95 (5,) m/s^3, smoothness_p95 and pose_p95
     (5,) m. poses (M, 6 J): some ten a second of all clips, twins included. heel_rest: height of the heel joint on a
-    flat foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s.
-    """
+    flat foot, m. fastest: highest speed of a root behind a 1 s window, slowest: the slowest gait, m/s."""
 
     fps: float
     index: dict[str, int]
@@ -98,8 +96,7 @@ class LibraryReference:
     def rows(self, clips: tuple[str, ...], clip: np.ndarray, clip_frame: np.ndarray) -> np.ndarray:
         """Fractional row (T,) of each output frame's source, NaN where it is not known.
 
-        clips: table of paths; clip (T,) int index into it, -1 unknown; clip_frame (T,) in the clip's own rate.
-        """
+        clips: table of paths; clip (T,) int index into it, -1 unknown; clip_frame (T,) in the clip's own rate."""
         table = np.array([self.index.get(path, -1) for path in clips] + [-1])
         own = table[clip]
         frame = np.clip(clip_frame * self.fps / self.rate[own], 0, np.diff(self.first)[own] - 1)
@@ -210,8 +207,7 @@ def source_poses(library: Library, clips: tuple[str, ...], clip, mirrored, clip_
     """Joints (T, J, 3) m of each output frame's source as recorded, seen from the body; NaN where it is not known.
 
     clips: table of paths; clip (T,) int index into it, -1 unknown; mirrored (T,) bool; clip_frame (T,) in the clip's
-    rate.
-    """
+    rate."""
     table = {(source.path, source.mirrored): source.motion for source in library.clips}
     out = np.full((len(clip), len(library.skeleton), 3), np.nan)
     for number, side in set(zip(clip.tolist(), mirrored.tolist())):

@@ -31,8 +31,7 @@ def evaluate(take: Take, track: Track | None, library: Library | None) -> dict:
     """The report of a take in memory: a dict in the form of the contract's Report JSON, None where nothing is known.
 
     track: the player's samples as measured, seconds and metres. library: what it was made from; without it there are no
-    scores of the recordings beside ours.
-    """
+    scores of the recordings beside ours."""
     report = evaluate_played(
         played_from_take(take), track=track, timeline=take.timeline, library=library, ik_miss=take.ik_miss,
         asked=take.plan.timeline if take.plan else Timeline(),
@@ -57,8 +56,7 @@ def evaluate_played(
 
     ik_miss: (T,) or (T, 2) metres by which inverse kinematics missed its targets, where that is known. asked: the
     user's own words, where `timeline` has automatic ones beside them. InputError where the library has another skeleton
-    than the motion.
-    """
+    than the motion."""
     view = View(played, track, timeline, library)
     report = {
         "version": VERSION, "seed": None, "fps": played.motion.fps, "frames": len(played.motion),
@@ -94,8 +92,7 @@ def rounded(value):
 def table(reports: Mapping[str, dict]) -> str:
     """Reports side by side as a Markdown table: one column per report, one row per figure, in the reports' order.
 
-    Nested figures are named with dots, key moments are numbered from 1; texts (warnings) are counted.
-    """
+    Nested figures are named with dots, key moments are numbered from 1; texts (warnings) are counted."""
     columns = {name: flat(report) for name, report in reports.items()}
     rows = dict.fromkeys(figure for column in columns.values() for figure in column)
     lines = ["| figure | " + " | ".join(columns) + " |", "|---|" + "---|" * len(columns)]

@@ -33,8 +33,7 @@ def check(trial: MarkerTrial, static: MarkerTrial | None, clusters: Mapping[str,
     """Lines on what is odd about a trial and its static, or model; InputError where no skeleton can come of it.
 
     clusters: segment -> labels. static, model: either may be missing. Raises where markers are mirrored or left and
-    right exchanged, where static or model are of another body, and where no marker is seen at all.
-    """
+    right exchanged, where static or model are of another body, and where no marker is seen at all."""
     labels = [label for group in clusters.values() for label in group if label in trial.labels]
     body = trial.only(labels)
     if not body.seen.any():

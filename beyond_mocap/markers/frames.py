@@ -16,8 +16,7 @@ class RigidFit(NamedTuple):
 
     rotation: (..., 3, 3) right-handed matrices. shift: (..., 3) m. rms: (...,) m, root of the weighted mean squared
     distance. sound: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly on
-    one line): it is one of many that fit as well. Without any marker seen, rotation, shift and rms are NaN.
-    """
+    one line): it is one of many that fit as well. Without any marker seen, rotation, shift and rms are NaN."""
 
     rotation: np.ndarray
     shift: np.ndarray
@@ -32,8 +31,7 @@ def rigid_fit(model: np.ndarray, seen: np.ndarray, weights: np.ndarray | None = 
     nothing. Leading axes are matched by numpy's rules, so that one shape (N, 3) fits a whole trial (T, N, 3).
 
     The factors of the cross-covariance C of both clusters about their means (eq. 3.12-3.13) give the rotation
-    (eq. 3.14), with the last direction turned round where it would mirror (eq. 3.15).
-    """
+    (eq. 3.14), with the last direction turned round where it would mirror (eq. 3.15)."""
     model, seen, weight = _counted(model, seen, weights)
     total = weight.sum(axis=-1)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -80,8 +78,7 @@ def mean_rotation(rotations: np.ndarray, weights: np.ndarray | None = None) -> n
     """The mean (3, 3) of rotation matrices (T, 3, 3): the one nearest to all by squared chords, NaN left out.
 
     weights: (T,) or None. The same as the dominant eigenvector of the quaternions' outer products (Markley et al. 2007,
-    the [46] of Fredriksson §5.2.1), found from the matrices' sum. Without any rotation: the identity.
-    """
+    the [46] of Fredriksson §5.2.1), found from the matrices' sum. Without any rotation: the identity."""
     rotations = np.asarray(rotations, dtype=float)
     weight = np.isfinite(rotations).all(axis=(-1, -2)) * (1.0 if weights is None else np.asarray(weights, dtype=float))
     if not np.any(weight > 0.0):

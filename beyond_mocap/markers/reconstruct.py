@@ -65,8 +65,7 @@ class Reconstruction:
     it was recorded; motion and trial are moved by that where `grounded`. model: whose skeleton it has. trial: the
     markers under the set's names, cleaned, all gaps filled that can be. raw: as given. solved: the pose before filters.
     cleaned: what was mended. release: of a throw, else None. held: (T, 2, 2) bool, see `plant_filter`. seconds:
-    of each step. warnings: lines.
-    """
+    of each step. warnings: lines."""
 
     motion: Motion
     model: MarkerModel
@@ -104,8 +103,7 @@ def reconstruct(trial: MarkerTrial, static: MarkerTrial | None = None, model: Ma
 
     static: the same markers on the same standing body, from which the model is made; without one it is made of the
     trial itself. model: one that was made before. InputError where markers are of no known set, where the static or the
-    model is of another body or set, where the markers are mirrored or too few. Cancelled where the user wants out.
-    """
+    model is of another body or set, where the markers are mirrored or too few. Cancelled where the user wants out."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):  # the same bits everywhere; and small systems are slower on several

@@ -28,8 +28,7 @@ class MarkerEvent:
     """A moment that the recording itself names.
 
     seconds: on the trial's clock (as `MarkerTrial.start`). label: as written, for instance "Foot Strike". side: "left",
-    "right" or "".
-    """
+    "right" or ""."""
 
     seconds: float
     label: str
@@ -171,8 +170,7 @@ def frame_times(trial: MarkerTrial) -> np.ndarray | None:
 
     The steps of all markers, each against its own smooth course, give one common unsteadiness per frame; it is compared
     with the one that a clock of whole milliseconds would make, at every phase, and believed where both correlate by
-    more than 0.8.
-    """
+    more than 0.8."""
     step = 1.0 / (trial.fps * TICK)
     if abs(step - round(step)) < 1e-3 or step < 1.5 or len(trial) < 3 * _SMOOTH:
         return None

@@ -123,8 +123,7 @@ def aligned_impacts(results: Sequence[TrialResult]) -> np.ndarray:
     """(N, 2) m of the N results: where each throw meets the ground, NaN where it does not.
 
     Axes as in fig. 8.2: origin at the hips in the trial's first frame, y along the direction of a subject's throws (the
-    mean of their level directions, for nobody knows the target), x to the right of it.
-    """
+    mean of their level directions, for nobody knows the target), x to the right of it."""
     out = np.full((len(results), 2), np.nan)
     for subject in {result.subject for result in results}:
         rows = [i for i, result in enumerate(results)

@@ -27,8 +27,7 @@ _BINS = 24
 def trials_report(folder: Path) -> str:
     """The page, as text: how well markers fit and how long it took, where throws land, how fast they are.
 
-    InputError where the folder holds no reports, or matplotlib is not installed.
-    """
+    InputError where the folder holds no reports, or matplotlib is not installed."""
     results = read_results(Path(folder))
     made = [result for result in results if not result.error]
     title = Path(folder).resolve().name

@@ -96,8 +96,7 @@ def aligned(
     touches: solved, on the match's clock, in order; halves: of the match. span: seconds within which
     touches were solved, by default all; events outside it keep their place and no touch. A period whose events fit no
     better than by chance is left out. InputError where that is so of all, and of many events: they are of another
-    match.
-    """
+    match."""
     span = span or (-np.inf, np.inf)
     times, clocks, notes = np.full(len(events.events), np.nan), {}, []
     for half in halves:

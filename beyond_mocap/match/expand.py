@@ -58,8 +58,7 @@ def expanded(
 
     library: the recordings. A take's first frame is the stretch's first one that is not before `start`; its plan is the
     order of that time, and it has no edit list. progress(fraction, text) is called now and then. InputError where the
-    library lacks a clip that is shown, and where `end` is not behind `start`.
-    """
+    library lacks a clip that is shown, and where `end` is not behind `start`."""
     if not end > start:
         raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
     report = progress or (lambda fraction, text: None)

@@ -78,8 +78,7 @@ def opened(path: Path, identity: Mapping[str, object]) -> Iterator[MatchFolder]:
 
     A match.json that is damaged is set aside, which `notes` tell, where there are pieces of work beside it. InputError
     where it cannot be made or written, holds results of another order or files that are none of a match, or somebody
-    else works in it.
-    """
+    else works in it."""
     check_folder(path)
     new, kept = not path.exists(), (path / _WORK).exists()
     if (path / STATE).exists() and not any((path / _WORK).glob("*/*.npz")):  # nothing that a run can go on from

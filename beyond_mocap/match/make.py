@@ -73,8 +73,7 @@ def make_match(
 
     progress(fraction, text) is called now and then. A player who cannot be made does not stop the others; match.json
     and the result say why. InputError for what is wrong with the order, its files or its cluster; Cancelled. What was
-    done till then is kept and found again by the next run.
-    """
+    done till then is kept and found again by the next run."""
     from threadpoolctl import threadpool_limits
 
     report = progress or (lambda fraction, text: None)

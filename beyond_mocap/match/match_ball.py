@@ -77,8 +77,7 @@ def met(ball: BallPath, first: int, led: Iterable[tuple[np.ndarray, np.ndarray]]
     """The ball (T frames from frame `first` of the match's clock on) where everybody's `led_by` has it.
 
     One who touches the ball leads it between the touches before and after his own only, so that what several do adds
-    up without hurting anybody's touch.
-    """
+    up without hurting anybody's touch."""
     places = np.array(ball.positions)
     for frames, off in led:
         inside = (frames >= first) & (frames < first + len(places))

@@ -40,8 +40,7 @@ class MatchOrder:
     shares with the next. variety: as a plan has it. workers, scheduler: `pool.Workplace`. The settings table says what
     the other fields mean.
     InputError for numbers outside their limits, a span that ends before it begins, times that are no numbers, and
-    what is said of events where there are none or of a provider whose events nobody reads.
-    """
+    what is said of events where there are none or of a provider whose events nobody reads."""
 
     tracking: Path
     library: Path

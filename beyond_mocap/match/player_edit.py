@@ -81,8 +81,7 @@ def kept(plan: Plan) -> Plan:
     """The plan as files keep it, so that what is made of it does not depend on whether it has been in one.
 
     Its touches are solved; the track's times are in whole microseconds, its places in whole
-    millimetres, and so is the ball's course, which has a point every COURSE_STEP and at each touch.
-    """
+    millimetres, and so is the ball's course, which has a point every COURSE_STEP and at each touch."""
     plan = solve_touches(plan)
     track = plan.track
     track = Track(

@@ -115,8 +115,7 @@ def pushed_apart(
     `mean_m` where somebody is moved, `seconds` in which somebody is, all players' summed.
 
     times (N,) s: of the feed's samples; touches: by id, seconds at which somebody touches the ball, who then keeps his
-    way.
-    """
+    way."""
     places = np.stack([_on_times(role.measured, times) for role in roles])
     step = float(np.median(np.diff(times)))
     keep = [keeping(len(times), (np.asarray(touches.get(role.player.id, ())) - times[0]) / step, 1.0 / step)

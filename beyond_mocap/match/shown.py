@@ -56,8 +56,7 @@ def shown(
     whatever span is asked for.
 
     ball: the match's, which every take has as its own; unknown in frames that it does not tell of. InputError as of
-    `expanded`.
-    """
+    `expanded`."""
     if not end > start:
         raise InputError("times", f"{start:g} to {end:g} s", "an end behind the start")
     takes = expanded(library, edit, start - AROUND, end + AROUND, progress)
@@ -73,8 +72,7 @@ def looking(
 
     ball (T, 3) m and whether it is known (T,) bool, at the motion's frames; look (3,): which way the head joint looks,
     in its own frame (`synthesize.look_of`). seed: of the player's habits; start: seconds of the motion's first frame on
-    the match's clock. Only chest, neck and head are turned.
-    """
+    the match's clock. Only chest, neck and head are turned."""
     random = np.random.default_rng([seed, 9])
     delay = random.uniform(*DELAY)
     phases, weights = random.uniform(0.0, 2.0 * np.pi, len(_PERIODS)), random.uniform(0.5, 1.0, len(_PERIODS))

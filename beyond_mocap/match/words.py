@@ -99,8 +99,7 @@ def words_of(
     time is the touch's. Touches of one player in a row are a stretch of dribble. A pass, shot or save without a touch
     becomes a key moment at its place on the corrected clock. Of two within NEAREST the surer one stays. What is not
     known (the foot, a height without heights in the feed) is left out of the words. InputError where events fit no
-    better than by chance.
-    """
+    better than by chance."""
     table = table or read_event_words()
     touches = solved.touches if solved else ()
     span = (float(solved.times[0]), float(solved.times[-1])) if solved else None
@@ -144,8 +143,7 @@ def read_words(
 ) -> tuple[Moment, ...]:
     """The moments in a file. automatic: lines that say what one of these says are that one; the others are the user's.
 
-    known_words: beyond the vocabulary. InputError, with the line, for what is no timeline or has unknown words.
-    """
+    known_words: beyond the vocabulary. InputError, with the line, for what is no timeline or has unknown words."""
     timeline = parse_timeline(read_text(path), str(path))
     validate(timeline, known_words, where=str(path))
     known = {_line(moment): moment for moment in automatic}

@@ -89,8 +89,7 @@ def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], 
     """The motion of a player who begins at `stance` and strikes as `orders` say.
 
     ball: its path at `fps` over the whole scene, which is the motion's. The same input gives the same bits. InputError
-    for orders outside the scene or two at once; Cancelled.
-    """
+    for orders outside the scene or two at once; Cancelled."""
     from threadpoolctl import threadpool_limits
 
     orders = sorted(orders, key=lambda order: order.time)

@@ -102,8 +102,7 @@ class HitLibrary:
         """How much each hit motion differs from an example (eq. 2), and their order.
 
         side: only hit motions of this side (None: all). Returns (order (K,), most alike first, indices into `hits`;
-        distance (H,) m). Ways are compared as each body sees them, so it does not matter where either faces.
-        """
+        distance (H,) m). Ways are compared as each body sees them, so it does not matter where either faces."""
         size, speed, vectors, times = self._arrays
         grown = size / max(example.size, 1e-6)
         distance = weights.speed * np.abs(speed - grown * example.max_speed)

@@ -47,8 +47,7 @@ class HitMotion:
     vectors (4, 3) m and times (4,) s: the part's way first - fast - high - fast - last, as the body sees it (x where it
     faces on average, y to its left, the pelvis' own travel taken out), and how long each took (eq. 2: m_i, t_i).
     velocity (3,) m/s: of the part at the key, in the same frame but with the body's travel. facing: radians, world.
-    size: the body's leg length, m. fps: frames per second.
-    """
+    size: the body's leg length, m. fps: frames per second."""
 
     part: str
     side: str
@@ -82,8 +81,7 @@ class Hits:
 
     height (T,): of the part above the ground, m; speed (T,): its speed, m/s. highs, fasts: frames. threshold: the
     height in m above which high frames were looked for. motions: in order of time, without overlap. ball_stretches,
-    links: (first, last) frames, both included. place (T, 3): the part, m, world.
-    """
+    links: (first, last) frames, both included. place (T, 3): the part, m, world."""
 
     part: str
     side: str
@@ -112,8 +110,7 @@ def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: 
     "right", no matter for head and chest. threshold: m above the ground over which the part has to rise; None: found
     from the heights it reaches, and steps of walking and running are left out. joint: a joint's name to look at instead
     of the part's own place. tool: what is in the hand (default: a racquet). InputError: a side that is neither, a part
-    or joint that the skeleton lacks, fewer than three frames, a threshold or poses that are no numbers.
-    """
+    or joint that the skeleton lacks, fewer than three frames, a threshold or poses that are no numbers."""
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
     place = strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)

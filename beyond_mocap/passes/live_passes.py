@@ -119,8 +119,7 @@ def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: s
     """The pass with which the holder answers a hit of the user: the library's most alike motion (eq. 2), to `target`.
 
     now: s, when all stand. InputError for a target that is nobody or the holder himself, or out of reach; NotInLibrary
-    where nothing strikes with that part; Cancelled.
-    """
+    where nothing strikes with that part; Cancelled."""
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
     one = Pass(rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side,

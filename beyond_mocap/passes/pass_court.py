@@ -62,8 +62,7 @@ class Site:
 
     player: his name. place (2,) m; facing rad before it. kind: toss, pass, attack, or receive (the last one). part;
     tool. size: of the body against the library's. moments: what it can strike with. asked: the pass that goes out, None
-    for the last strike.
-    """
+    for the last strike."""
 
     player: str
     place: np.ndarray

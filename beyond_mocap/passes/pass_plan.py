@@ -144,8 +144,7 @@ def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
     """The chain of strikes and flights of a scene.
 
     sites: of every strike, the last one where the last pass ends. need: seconds that a player needs from one strike, or
-    from standing, to the next. InputError where no human sends the ball so far, or over the net; Cancelled.
-    """
+    from standing, to the next. InputError where no human sends the ball so far, or over the net; Cancelled."""
     report = progress or (lambda share, text: None)
     court = Court(scene, list(sites), ball, cancelled or (lambda: False))
     chain = choose(court, lambda share, text: report(0.8 * share, text))

@@ -126,8 +126,7 @@ class PassScene:
     in steps of 45 degrees; 0: any way. The settings table says what the other fields mean.
 
     InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
-    passes that do not go on where the one before went, numbers outside LIMITS.
-    """
+    passes that do not go on where the one before went, numbers outside LIMITS."""
 
     players: tuple[Player, ...]
     passes: tuple[Pass, ...]

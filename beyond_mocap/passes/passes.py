@@ -81,8 +81,7 @@ def passes(library: Library, scene: PassScene, progress: Callable[[float, str], 
     """The scene played with the motions of a library. The same scene and library give the same bits.
 
     InputError for a part that the skeleton lacks, and for passes that no human can give; NotInLibrary where nothing in
-    the library strikes with a part; Cancelled.
-    """
+    the library strikes with a part; Cancelled."""
     report, stop = progress or (lambda share, text: None), cancelled or (lambda: False)
     plan = planned(library, scene, lambda share, text: report(PLANNED * share, text), stop)
     path = ball_path(plan)

@@ -111,8 +111,7 @@ class StrikeMoments:
 
     hits (H,): whose moments they are; which (N,): index into them; frame (N,): in the clip's own rate. struck: the part
     there. lead, trail (N,) s: from the hit motion's first frame, and to its last. travel (N,) m: how far the body goes
-    on the ground in the hit motion.
-    """
+    on the ground in the hit motion."""
 
     hits: tuple[LibraryHit, ...]
     which: np.ndarray

@@ -57,8 +57,7 @@ class HitOrder:
     one that strikes, in that rate. place (2,) m and facing rad: of the root on the ground and of the heading at the
     strike. ball (3,) m: the ball's centre then; normal (3,): unit, the way from the part to the ball. part, side: of
     `contact.PARTS` or a joint's name. tool: what is in the hand. kind: toss, pass, attack or receive. touches: whether
-    he meets the ball; who misses it plays on as recorded.
-    """
+    he meets the ball; who misses it plays on as recorded."""
 
     time: float
     clip: int

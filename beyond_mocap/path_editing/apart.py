@@ -77,8 +77,7 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
     """The changes that keep these bodies apart, least in all.
 
     changes: what has been asked of them already and shall stay at least (one Change each). Bodies without a path stay
-    as they are; collisions among those alone are nobody's concern here.
-    """
+    as they are; collisions among those alone are nobody's concern here."""
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
     before = state.collisions

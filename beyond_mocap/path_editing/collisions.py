@@ -24,8 +24,7 @@ class Collision:
     """Two bodies nearer than the distance asked for, without a break.
 
     first, second: numbers of the bodies, first < second. start, end: seconds. time: when they are nearest. gap: metres
-    between them then. place (3,): metres, the middle between both then.
-    """
+    between them then. place (3,): metres, the middle between both then."""
 
     first: int
     second: int
@@ -39,8 +38,7 @@ class Collision:
 def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE, height: float = HEIGHT) -> list:
     """All collisions, by time.
 
-    times (T,): seconds, rising. places (N, T, 3): metres on the ground.
-    """
+    times (T,): seconds, rising. places (N, T, 3): metres on the ground."""
     found = []
     for first in range(len(places) - 1):
         found += collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,

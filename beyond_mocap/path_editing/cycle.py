@@ -61,8 +61,7 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
     """The motion repeated until it is `length` metres long; it is returned as it is where it is so long already.
 
     loops: what `find_loops` found, for callers that keep it. Raises InputError for a motion that has no loop and for a
-    length that is no length.
-    """
+    length that is no length."""
     if not np.isfinite(length) or length <= 0.0:
         raise InputError("path", f"{length:g} m long", "a length above 0", "draw a longer path")
     own = float(residuals.step.sum())
@@ -204,8 +203,7 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
     """The motion with all jumps made and faded over, and its seams (S,).
 
     Every jump over one loop is faded alike, so that it is worked out once: the frames are taken from the motion with
-    one fade for each loop behind it.
-    """
+    one fade for each loop behind it."""
     count, kinds = len(residuals), list(dict.fromkeys(jumps))
     reach = _reach(residuals, jumps)
     begins = [0] + [loop.start for loop in jumps]

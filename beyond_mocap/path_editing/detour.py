@@ -45,8 +45,7 @@ def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
 def gentle_width(offset, speed: float):
     """Metres of path that a detour by `offset` needs for someone at `speed` m/s.
 
-    Its bends are no tighter than a radius of 4 m, and push sideways by no more than 1.5 m/s^2.
-    """
+    Its bends are no tighter than a radius of 4 m, and push sideways by no more than 1.5 m/s^2."""
     bend = min(0.25, 1.5 / max(speed, 0.1) ** 2)
     most = 10.0 / np.sqrt(3.0)  # the quintic step's largest bend
     return np.maximum(1.5, np.sqrt(most * np.abs(offset) / bend) / RISE)
@@ -55,8 +54,7 @@ def gentle_width(offset, speed: float):
 def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
     """Unwrapped yaw (N,) of a line (N, 3) of places `spacing` metres apart, smoothed over a step.
 
-    Where the line goes straight up or down it is that of the way before and behind it.
-    """
+    Where the line goes straight up or down it is that of the way before and behind it."""
     along = np.gradient(places, axis=0)
     if closed:
         along[0] = along[-1] = 0.5 * (places[1] - places[-2])
@@ -96,8 +94,7 @@ def with_detours(path: Path, detours) -> Path:
     """The path with these detours [(arc, width, offset)], C2 as before, under the same parameters; see above.
 
     Its ends move where a detour takes them in. Without detours it is `path` itself. InputError where a detour is not
-    three finite numbers, the second positive.
-    """
+    three finite numbers, the second positive."""
     for detour in detours:
         if len(detour) != 3 or not np.isfinite(detour).all() or detour[1] <= 0.0:
             raise InputError("detour", str(tuple(detour)), "arc, width and offset in metres, the width above 0")
@@ -154,8 +151,7 @@ class Follower:
 
     times (T,): seconds, rising, the same clock for all. places (T, 3): metres on the ground. path: what it follows;
     None: something that cannot be asked to give way. arc (T,): metres it has gone along the path. by_arc: whether it
-    keeps its speed, so that a detour makes it come later; else it is where its path's parameter says.
-    """
+    keeps its speed, so that a detour makes it come later; else it is where its path's parameter says."""
 
     name: str
     times: np.ndarray

@@ -75,8 +75,7 @@ def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing
     """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat
-    foot is above its ground. steps: None where they are as long as they were.
-    """
+    foot is above its ground. steps: None where they are as long as they were."""
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
@@ -220,8 +219,7 @@ def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.nd
 
     A knee bends with the root of what its leg lacks to its full length. In these roots what a leg is to differ from the
     recording is one smooth curve: what the goals ask for where the foot stands, and little of it in the air where that
-    would make the leg straighter than it was.
-    """
+    would make the leg straighter than it was."""
     line = goal - hip
     far = np.linalg.norm(line, axis=1)
     own = np.maximum(foot.own, 1e-5)

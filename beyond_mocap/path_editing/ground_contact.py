@@ -122,8 +122,7 @@ def footing(feet: np.ndarray, standing: np.ndarray, clear: np.ndarray, fps: floa
     """The ground under two feet.
 
     feet (T, 2, 2, 2) m: left and right, heel and toe, over the ground; standing (T, 2, 2) bool; clear (T, 2) m: how
-    high each foot was above its own ground.
-    """
+    high each foot was above its own ground."""
     sides = [_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface) for side in (0, 1)]
     return Footing(*(np.stack(parts, axis=1) for parts in zip(*sides)))
 

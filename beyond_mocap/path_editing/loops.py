@@ -42,8 +42,7 @@ class Loop:
     apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
     unlike: the same as a share of how far apart any two moments of the motion are; cost: the same in metres with what
     else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending:
-    how unlike anything in the loop the motion's last moment is, on the scale of `unlike`.
-    """
+    how unlike anything in the loop the motion's last moment is, on the scale of `unlike`."""
 
     start: int
     end: int
@@ -96,8 +95,7 @@ def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> f
     without any.
 
     Told by the soles, which land and leave; of a motion whose soles say nothing, by the lag after which its poses come
-    again; of a single stride by its two steps.
-    """
+    again; of a single stride by its two steps."""
     moving = smooth_speed(residuals) > _SLOWEST
     edges = np.diff(residuals.standing.any(axis=2).astype(np.int8), axis=0)
     at = [[np.flatnonzero((edges[:, side] == kind) & moving[1:]) for side in (0, 1)] for kind in (1, -1)]

@@ -51,8 +51,7 @@ class Residuals:
     path's length since the frame before, 0 in the first; standing (T, 2, 2) bool of heels and toes, left and right;
     frames (T,) of the source, in general fractional; turn (T,) radians that the path turns since the frame before;
     under (T, 2) m from the path up to the ground under each foot and up (T, 2, 3) its normal in the frame; fps,
-    skeleton. Every array has a row a frame.
-    """
+    skeleton. Every array has a row a frame."""
 
     place: np.ndarray
     rotations: np.ndarray
@@ -148,8 +147,7 @@ def heading(along: np.ndarray, speed: np.ndarray, fps: float, otherwise: float |
     stands does not spin with it: least squares over frames, sum w |h - a|^2 + s^4 |h''|^2 + (s^2 / t)^2 |h'|^2 with a
     the tangent's direction, s = _STIFF, t = _TIGHT, and the weight w falling steeply below a slow walk, _FULL. At a
     walk and above that is the tangent's own direction. Who sways or shifts his feet about is slow, however fast that
-    is: what counts is how far he comes within a second.
-    """
+    is: what counts is how far he comes within a second."""
     mean = zero_phase_hann(along[:, :2] * speed[:, None], fps, _COMES) if len(along) > 2 else along[:, :2]
     speed = np.maximum(np.minimum(np.linalg.norm(mean, axis=1), speed), speed - _SURELY)
     raw = arctan2(along[:, 1], along[:, 0])
@@ -173,8 +171,7 @@ def fit_path(motion: Motion, standing: np.ndarray, kind: str = "spline", degree:
     """The path of a motion, on the ground; its parameter is seconds from the first frame.
 
     standing: (T, 2, 2) bool, `contacts.points` of the motion. kind: one of KINDS. degree: of the polynomial. InputError
-    for another kind, a degree too high, fewer than two frames.
-    """
+    for another kind, a degree too high, fewer than two frames."""
     if kind not in KINDS:
         raise InputError("path fit", kind, " or ".join(KINDS))
     places, times = places_on_ground(motion, standing), np.arange(len(motion)) / motion.fps
@@ -186,8 +183,7 @@ def fit_polynomial(places: np.ndarray, times: np.ndarray, degree: int) -> Polyno
 
     Legendre polynomials of time scaled to -1 .. 1 are nearly orthogonal over even frames, so that degree 45 is as exact
     as degree 2. Where frames are so few for the degree that the polynomial would swing between them, they are filled up
-    by a cubic spline through them. InputError where the degree is below 1 or there are too few frames for it.
-    """
+    by a cubic spline through them. InputError where the degree is below 1 or there are too few frames for it."""
     places, times = _checked(places, times)
     if not 1 <= degree <= len(times) - 1:
         raise InputError("path fit", f"degree {degree}", f"1 to {len(times) - 1}, one less than the frames")
@@ -222,8 +218,7 @@ def fit_spline(places: np.ndarray, times: np.ndarray, seconds: float = SECONDS) 
     of all that follows. Measured on 14 recordings (CMU, LAFAN1, Bandai, runs, kicks), root error mean / 95 % in cm, and
     what a sway of one stride a second loses: price on acceleration, 0.4 s: 0.5 to 9 / 1 to 27, 2 %; 0.2 s: 0.3 to 2 /
     0.6 to 8, 29 %; this one: 0.2 to 1.2 / 0.3 to 2.5, 8 %. Its heading wobbles by a degree rms about its own mean over
-    1.5 s in walks. Without the weight on the ends, where there are values on one side only, 0.2 to 1.4 / 0.5 to 4.3.
-    """
+    1.5 s in walks. Without the weight on the ends, where there are values on one side only, 0.2 to 1.4 / 0.5 to 4.3."""
     places, times = _checked(places, times)
     after, left = times - times[0], times[-1] - times
     weights = 1.0 + _ENDS * (np.exp(-after / _ENDS_SECONDS) + np.exp(-left / _ENDS_SECONDS))
@@ -242,8 +237,7 @@ def places_on_ground(motion: Motion, standing: np.ndarray) -> np.ndarray:
 
     standing: (T, 2, 2) bool, left and right, heel and toe. Level ground is as high as `contacts.recorded_floor`. Where
     the soles that stand lie within a hand's breadth of height, the ground is flat; else its height is that of the feet
-    that stand, smoothed, and between stances a straight line over time.
-    """
+    that stand, smoothed, and between stances a straight line over time."""
     body = identify(motion.skeleton)
     positions, _ = forward_kinematics(motion)
     places = positions[:, body.hips].copy()

@@ -37,8 +37,7 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
     name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres;
     smooth lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends
     exactly. closed: the last point is joined to the first. InputError for fewer than two different points, values that
-    are not finite, lines shorter than SHORTEST.
-    """
+    are not finite, lines shorter than SHORTEST."""
     line = _checked(line, name, closed)
     length = distance_along(line)[-1]
     rounding = max(min(rounding, length / 12), length / _LONGEST)
@@ -60,8 +59,7 @@ def b_spline(points: np.ndarray, degree: int) -> SplinePath:
 
     Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which
     does not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control
-    points.
-    """
+    points."""
     points = np.asarray(points, dtype=float)
     _checked(points, "control points", closed=False)
     _check_degree(len(points), degree)
@@ -72,8 +70,7 @@ def control_points(path: Path, count: int, degree: int) -> np.ndarray:
     """The control points (count, 3) in metres of the B-spline nearest to a path, whose ends it meets; see `b_spline`.
 
     Least squares over even steps of arc length, so that control points lie even too. InputError as there for the
-    degree.
-    """
+    degree."""
     from scipy.interpolate import BSpline
 
     _check_degree(count, degree)
@@ -89,8 +86,7 @@ def control_points(path: Path, count: int, degree: int) -> np.ndarray:
 def straight(path: Path, count: int) -> np.ndarray:
     """Even control points (count, 3) in metres from where a path begins to where it ends: a neutral start (§4.6.6).
 
-    Where it ends where it begins, to its farthest place. InputError for fewer than two.
-    """
+    Where it ends where it begins, to its farthest place. InputError for fewer than two."""
     _check_degree(count, 1)
     places, _ = _even_places(path, 200)
     first, last = places[0], places[-1]
@@ -155,8 +151,7 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
     """Samples (M, 3) with room to turn round where the line, `along` (M,) metres, turns by more than a right angle.
 
     On the way in they swing out to the outer side, on the way back to the inner one, by up to `rounding` metres: a line
-    that goes back where it came from would have to stop and turn on the spot.
-    """
+    that goes back where it came from would have to stop and turn on the spot."""
     step, count = along[1], len(line) - closed
     reach = max(int(round(rounding / step)), 1)
     inner = np.arange(count) if closed else np.arange(reach, count - reach)
@@ -183,8 +178,7 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
 def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
     """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
 
-    period: samples in a round, for closed lines.
-    """
+    period: samples in a round, for closed lines."""
     before, after = (at - reach) % period, (at + reach) % period
     chords = line[at] - line[before], line[after] - line[at]
     return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
@@ -218,8 +212,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     semicolons or tabs; then numbers may have decimal commas.
 
     InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
-    given, or more than 100 km in all.
-    """
+    given, or more than 100 km in all."""
     names, points = COLUMNS[:2], []
     for place, row in read_rows(path, names, _SHORT, ",;\t"):
         if not points:

@@ -25,8 +25,7 @@ def figures(source, ridden, path, ground=None) -> dict:
     """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
 
     path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins
-    anew with its path only the first time is looked at: the others are the same, with a cut between.
-    """
+    anew with its path only the first time is looked at: the others are the same, with a cut between."""
     ridden = ridden.once
     pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
@@ -59,8 +58,7 @@ def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndar
     """Distance (T,) m of the root, pelvis (T, 2) behind the window, from the path's nearest point, behind the same
     window.
 
-    origin (T, 2) m: where on the path the ride was; what of the path it never came to is left as it is.
-    """
+    origin (T, 2) m: where on the path the ride was; what of the path it never came to is left as it is."""
     low, high = path.domain
     line = path.at(np.linspace(low, high, 4001))[:, :2]
     way = np.concatenate([zero_phase_hann(origin, fps, movement.ROOT_WINDOW), line])
@@ -81,8 +79,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
     """Arc length per frame against the recording's at the frame that is shown: shares by which it is off, where the
     recording moves and nothing is joined. Played twice as fast it is off by 1.
 
-    path: of the path; body: of the pelvis behind the window, which in bends is shorter by what the window cuts off.
-    """
+    path: of the path; body: of the pelvis behind the window, which in bends is shorter by what the window cuts off."""
     fps, there = ridden.motion.fps, np.arange(len(frames) - 1)
     middle = 0.5 * (ridden.frames[1:] + ridden.frames[:-1])
     ends = np.clip((middle + [[-0.5], [0.5]]) / source.motion.fps, *source.path.domain)

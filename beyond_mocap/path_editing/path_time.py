@@ -100,8 +100,7 @@ def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: floa
     """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
 
     The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS /
-    k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions.
-    """
+    k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions."""
     k_own, r_own = _steps(own, wishes)
     k, r = _steps(new, wishes)
     asked = np.cumsum(residuals.step / k_own)
@@ -238,8 +237,7 @@ def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", c
     """How a motion ends on a path `length` metres long, when it is at arc (T,) m, never falling, in its frames.
 
     end: "stop", or "repeat": motion and path begin again, as often as there are frames, without the wait that a rider
-    begins with. InputError for a path that has no length.
-    """
+    begins with. InputError for a path that has no length."""
     if not np.isfinite(length) or length <= SHORTEST:
         raise InputError("path", "it has no length", "two different points", "draw a longer path")
     total = len(arc)

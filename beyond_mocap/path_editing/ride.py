@@ -86,8 +86,7 @@ class RideSource:
     motion; standing (T, 2, 2) bool, left and right, heel and toe; path with seconds as its parameter; arc: its length;
     moving: its frame at every frame; residuals; frame: the one of FRAMES they are relative to; humanoid: whether it has
     feet that can be planted; still: whether it goes nowhere; sole: metres that the
-    foremost joint of a flat foot is over the ground; warnings.
-    """
+    foremost joint of a flat foot is over the ground; warnings."""
 
     motion: Motion
     standing: np.ndarray
@@ -164,8 +163,7 @@ def prepare(motion: Motion, settings: RideSettings, standing: np.ndarray | None 
     """The motion relative to its own path.
 
     standing: (T, 2, 2) bool, by default told from the motion (`contacts.points`). path: its own path, its parameter
-    seconds from the first frame, by default fitted as `settings` say. InputError for less than two frames.
-    """
+    seconds from the first frame, by default fitted as `settings` say. InputError for less than two frames."""
     if len(motion) < 2:
         raise InputError("motion", f"{len(motion)} frame", "two or more frames")
     humanoid, told = _humanoid(motion)
@@ -198,8 +196,7 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
     ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across
     it.
     The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the
-    path has no length.
-    """
+    path has no length."""
     path = with_detours(path, settings.detours)
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)

@@ -40,8 +40,7 @@ class Finding:
     of findings (Holm 1979). wilcoxon_p: by signed ranks. normal_p: Shapiro and Wilk's of the differences. pooled_p: of
     all answers as if each had a rater of its own, by Welch's t, of pairs by the binomial distribution of choices. d:
     Cohen's d of the differences; delta: Cliff's, the share of pairs of ratings in which new is higher less that in
-    which it is lower. NaN where there are too few.
-    """
+    which it is lower. NaN where there are too few."""
 
     new: str
     old: str

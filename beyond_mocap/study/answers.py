@@ -37,8 +37,7 @@ def read_answers(study: Study, paths: Sequence[Path]) -> Answers:
     """The answers in files and folders of files (.csv, .json). Empty answers are left out.
 
     InputError, with the line, for answers to another study, of a rater or to a question that it has not, or that are no
-    choice; where one rater answered a question in two ways; and where nobody answered.
-    """
+    choice; where one rater answered a question in two ways; and where nobody answered."""
     found: dict[str, dict[str, tuple[str, str]]] = {}
     for path in answer_files(paths):
         for place, mark, rater, question, answer in _rows(path):

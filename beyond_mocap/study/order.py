@@ -81,8 +81,7 @@ def ordered(clips: Sequence[Clip], raters: int, seed: int = 0, pairs: bool = Fal
     do not change with how many there are.
 
     InputError where there are not exactly two training clips, fewer than two systems, a system without a scenario that
-    another has, a clip twice, or too few clips for so many different orders.
-    """
+    another has, a clip twice, or too few clips for so many different orders."""
     _check(clips)
     named = _named(clips, seed)
     mark = hex_digest(repr((seed, pairs, [(c.file, c.system, c.scenario) for c in named])), digits=8)

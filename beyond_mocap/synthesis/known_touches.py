@@ -99,8 +99,7 @@ def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
     """The timeline with key moments at the touches that suit them best, each touch for one, in the order of both.
 
     Key moments and touches are brought together as two lines of text are: a key moment without a touch costs FURTHEST,
-    one with a touch the seconds in between and what of the touch does not fit its words.
-    """
+    one with a touch the seconds in between and what of the touch does not fit its words."""
     keys = [replace(key, solved=None) for key in timeline.keys]
     mine = [touch for touch in touches if touch.mine is not False]
     best = np.full((len(keys) + 1, len(mine) + 1), np.inf)

@@ -169,8 +169,7 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
     """Sample a track at `fps` frames per second.
 
     Where its ball is solved, it has the solved height, and the solved place where the feed has not measured it: where
-    it has, the ball is met within the noise of the measurement. window: s that take the feed's jitter out.
-    """
+    it has, the ball is met within the noise of the measurement. window: s that take the feed's jitter out."""
     sampled = sample(track, fps, window)
     if course is None:
         return sampled
@@ -191,8 +190,7 @@ class ResolvedPlan:
     timeline: the asked annotations, not yet filled, with key moments at the touches that they mean.
     track: the player's samples, m in the library's size.
     course: the solved course of the ball, m in the player's size; None where it is not solved.
-    size: how many times as tall as the library's skeleton the player is.
-    """
+    size: how many times as tall as the library's skeleton the player is."""
 
     asked: Plan
     timeline: Timeline

@@ -76,8 +76,7 @@ def resynthesize(
     rate, length or choice), where `before` was made from another library or by another method than "path", or where all
     of it is touched. The same library, plan and take give the same bits. anew: a stretch of which another solution is
     wanted, whether or not its plan has changed; InputError where it lies outside the take, or for another method than
-    "path". progress, cancelled, hurry and what is raised: as for `synthesize`.
-    """
+    "path". progress, cancelled, hurry and what is raised: as for `synthesize`."""
     from threadpoolctl import threadpool_limits
 
     report = progress or (lambda fraction, text: None)

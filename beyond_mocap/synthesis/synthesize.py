@@ -93,8 +93,7 @@ def synthesize(
     before anything is found, and by the other methods, that is Cancelled too. used: footage that another solution is to
     do without where it can (method "path"; the others differ by their seed). narrow: whether method "path" searches
     quickly from the start. The same library, plan and numpy give the same bits: linear algebra is held to one thread,
-    since more add up in another order.
-    """
+    since more add up in another order."""
     if plan.method not in METHODS:
         raise InputError("--method", plan.method, f"one of {', '.join(METHODS)}")
     from threadpoolctl import threadpool_limits
@@ -123,8 +122,7 @@ def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: 
 
     edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
     (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
-    take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits.
-    """
+    take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):

@@ -20,8 +20,7 @@ class KeyResult:
 
     asked: the line of the timeline. frame: output frame (fractional) where the clip's key frame is played. clip
     (path below the library), clip_frame (in the clip's own rate), mirrored. words: what the clip carries there, sides
-    after mirroring. used_instead: the words used where the asked ones were not to be had, else None.
-    """
+    after mirroring. used_instead: the words used where the asked ones were not to be had, else None."""
 
     asked: KeyMoment
     frame: float
@@ -69,8 +68,7 @@ class Take:
     at the library's rate, for `resynthesize`. cut_short: whether part of it was searched in a hurry. pins: how they
     were met; unpinned: motion and contacts without them, None where there are none. solved: the ball's course where it
     was solved; met_ball: the ball as it was met, before it was led along that course, None where it was not; dribbled:
-    the touches of dribbles.
-    """
+    the touches of dribbles."""
 
     motion: Motion
     start_time: float

@@ -104,8 +104,7 @@ def plan(
 
 def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:
     """Strides per second (T,) for an adult at `gear` (T,) m/s; more when going backward or sideways or turning on the
-    spot.
-    """
+    spot."""
     usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
     on_the_spot = 1.0 - quintic_step(gear / 1.8)
     return np.hypot(usual, on_the_spot * turn_rate / 1.3)

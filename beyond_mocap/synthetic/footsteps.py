@@ -54,8 +54,7 @@ class Footsteps:
 @dataclass(frozen=True, eq=False)
 class FootPath:
     """ankle (T, 3) metres, world; pitch, yaw, bend (T,) radians: sole (toes down positive), direction, toes (up
-    positive).
-    """
+    positive)."""
 
     ankle: np.ndarray
     pitch: np.ndarray
@@ -95,8 +94,7 @@ def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray)
 
 def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
     """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole
-    pitches.
-    """
+    pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
     # on the ball (and, beyond, on the toe tip)
@@ -117,8 +115,7 @@ def travel(
 ) -> FootPath:
     """The whole way of one foot at `times` (T,), given its hip joint (T, 3) and the body's heading (T,) there.
 
-    thigh_shank: bone lengths, metres. Times have to be evenly spaced.
-    """
+    thigh_shank: bone lengths, metres. Times have to be evenly spaced."""
     which = steps.current(times)
     share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
     standing = stand(steps, which, share, neutral)
@@ -204,8 +201,7 @@ def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.nda
 def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
     """What has to be added (N, C) along a swing so that it begins and ends `offset`s away with `speed`s changed.
 
-    Offsets are spread over the whole swing; speeds are mended within its first and last third.
-    """
+    Offsets are spread over the whole swing; speeds are mended within its first and last third."""
     reach = 1.0 / 3.0
     blend = quintic_step(share)[:, None]
     out = offset0 * (1.0 - blend) + offset1 * blend
@@ -244,8 +240,7 @@ def lift_off_ground(
 ) -> np.ndarray:
     """How much (T,) metres a foot has to be raised for its lowest point to be `clearance` above the ground, softly.
 
-    ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive.
-    """
+    ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive."""
     ball_ahead, drop, ball_up = neutral.ball[0, 0], -neutral.ball[0, 2], neutral.ankle_height + neutral.ball[0, 2]
     toe = ankle_up - (ball_ahead + neutral.tip) * np.sin(pitch) - drop * np.cos(pitch) - ball_up
     heel = ankle_up + neutral.heel * np.sin(pitch) - neutral.ankle_height * np.cos(pitch)

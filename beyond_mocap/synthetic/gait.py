@@ -65,8 +65,7 @@ def gait_posture(course: Course, neutral: Neutral, style: GaitStyle = GaitStyle(
 
 def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> Footsteps:
     """When and where one foot (0 left, 1 right) stands: below the hips in the middle of each stance, width and lean
-    apart.
-    """
+    apart."""
     offset = 0.5 * side
     cycles = np.arange(np.ceil(course.phase[0] - offset), np.floor(course.phase[-1] - offset)) + offset
     on = np.interp(cycles, course.phase, course.times)
@@ -115,8 +114,7 @@ def _within_reach(
 
 def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
     """How far the feet stay behind the hips (K, 2) metres while the body leans into an acceleration: the lean's
-    balance.
-    """
+    balance."""
     height = 0.8 * (neutral.leg + neutral.ankle_height)
     shift = height * interpolate(at, course.times, course.acceleration) / tables.GRAVITY
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
@@ -141,8 +139,7 @@ def posture_over(
 
 def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: Neutral) -> Posture:
     """The posture with feet that stand as `steps` says (left, right), hips lowered where a leg would not reach. times
-    (T,).
-    """
+    (T,)."""
     hips = posture.hips.copy()
     hips[:, 2] -= _drop(posture, times, steps, neutral)
     posture = posture.changed(hips=hips)
@@ -255,8 +252,7 @@ def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) ->
 
 def _surge(course: Course, middle: np.ndarray) -> np.ndarray:
     """How far (N,) metres the hips run ahead of a steady pace: slowest over the middle of stance (braking, then
-    pushing).
-    """
+    pushing)."""
     swing = np.minimum(0.07 * course.speed, 0.16)
     frequency = np.maximum(np.gradient(course.phase, course.times), 0.3)
     return -swing / (4.0 * np.pi * frequency) * np.sin(4.0 * np.pi * (course.phase - middle))
@@ -264,8 +260,7 @@ def _surge(course: Course, middle: np.ndarray) -> np.ndarray:
 
 def _leaning(course: Course) -> np.ndarray:
     """Extra lean (N, 2) of the body into its acceleration: list (right down positive... about X) and tilt (about Y),
-    radians.
-    """
+    radians."""
     cos, sin = np.cos(course.heading), np.sin(course.heading)
     forward = course.acceleration[:, 0] * cos + course.acceleration[:, 1] * sin
     left = -course.acceleration[:, 0] * sin + course.acceleration[:, 1] * cos

@@ -94,8 +94,7 @@ def _curve(name: str) -> PchipInterpolator:
 
 def at_speed(name: str, speed: float | np.ndarray) -> np.ndarray:
     """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table
-    says.
-    """
+    says."""
     return _curve(name)(np.clip(speed, 0.0, FASTEST))
 
 
@@ -162,8 +161,7 @@ def _stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
 
 def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     """Pitch of the sole (...,) in radians, toes down positive, at a share (...,) of the stance, for a speed (...,) in
-    m/s.
-    """
+    m/s."""
     speeds, curve = _stance_curves()
     values = curve(np.clip(share, 0.0, 1.0))
     position = np.interp(speed, speeds, np.arange(len(speeds)))
@@ -192,8 +190,7 @@ def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndar
     """Height of the body over its mean, metres, in running (L): contact from step phase 0 to `contact_share`, then
     flight.
 
-    step_phase (...,) 0 .. 1 from a foot's contact, contact_share (...,) of the step, step_time (...,) seconds.
-    """
+    step_phase (...,) 0 .. 1 from a foot's contact, contact_share (...,) of the step, step_time (...,) seconds."""
     duties, phase, heights = _bounce_table()
     row = np.interp(contact_share, duties, np.arange(len(duties)))
     column = (np.asarray(step_phase) % 1.0) * (len(phase) - 1)

@@ -134,8 +134,7 @@ def strike(
     """The right foot meets the ball after an approach and runs on: `kind` is one of STRIKES; facing and travelling +X.
 
     speed: factor on the approach's speed. at_speed: m/s of a run in which the kick happens, instead of an approach that
-    slows down. example: as for `gait`. At the key moment the ball is at the foot, see `foot` of the Strike.
-    """
+    slows down. example: as for `gait`. At the key moment the ball is at the foot, see `foot` of the Strike."""
     recipe = STRIKES[kind] if at_speed is None else _on_the_run(STRIKES[kind], at_speed)
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     key = -recipe.speeds[0][0]
@@ -235,8 +234,7 @@ def dribble(
 ) -> Motion:
     """Running with the ball at the feet: short strides, bent knees, the eyes down, each right swing ends in a touch.
 
-    `way`: turn_rate, phase as for `gait`.
-    """
+    `way`: turn_rate, phase as for `gait`."""
     neutral = neutral_stance(skeleton or adult_skeleton())
     style = GaitStyle(cadence=1.12, crouch=np.radians(7), lean=np.radians(4), head=np.radians(30), abduct=np.radians(9))
     course = plan(speed, duration, fps, neutral, style=style, seed=seed, **way)

@@ -44,8 +44,7 @@ class KickStyle:
     abduction). foot: rows (time, bent down at the ankle, toes turned out). pelvis: rows (time, list, tilt, turn),
     spine: rows (time, list, tilt, turn), both as in a `Posture`. left_arm, right_arm: rows (time, brought forward,
     abduction, inward turn, elbow). hips: rows (time, ahead of where they are at the contact, left of it, lowered), from
-    the planting on.
-    """
+    the planting on."""
 
     approach: float
     strides: tuple[float, ...]
@@ -143,8 +142,7 @@ def kicked(
     seconds.
 
     foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
-    it. loft: degrees by which its toes point less down there. fps: frames per second.
-    """
+    it. loft: degrees by which its toes point less down there. fps: frames per second."""
     times = np.arange(int(round((AFTER + BEFORE) * _PLAN)) + 1) / _PLAN - BEFORE
     posture, curve = _upright(style, neutral, times)
     plan = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)

@@ -73,8 +73,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     """The recording with flight, landing and getting up behind it, by the way up that needs least turning over.
 
     motion: ends in flight, the ground at height 0. ways_up: at least one motion of the same skeleton from lying to
-    standing, on the same ground.
-    """
+    standing, on the same ground."""
     skeleton, body, fps = motion.skeleton, identify(motion.skeleton), motion.fps
     motion = motion.frames(0, _trusted(motion))
     track = _Track(motion)

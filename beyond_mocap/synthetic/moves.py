@@ -100,8 +100,7 @@ def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np
 
 def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
     """Ankle (N, 3), pitch (N,) and toe bend (N,) of a foot that rolls up on its ball, hangs in the air and comes down
-    again.
-    """
+    again."""
     ball_ahead, drop = neutral.ball[0, 0], -neutral.ball[0, 2]
     ahead = ball_ahead - ball_ahead * np.cos(pitch) + drop * np.sin(pitch)
     up = neutral.ankle_height - drop + ball_ahead * np.sin(pitch) + drop * np.cos(pitch)
@@ -236,8 +235,7 @@ def getting_up(
     """From lying on the back, face up, to standing: sitting up on the hands, feet drawn in, over the crouch; key:
     halfway.
 
-    rest: seconds of lying before. example: a recording of the skeleton, for its neutral stance.
-    """
+    rest: seconds of lying before. example: a recording of the skeleton, for its neutral stance."""
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     duration = rest + _UP_TIME + 0.9

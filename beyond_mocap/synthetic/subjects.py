@@ -201,8 +201,7 @@ def make_throw(
 ) -> Throw:
     """A throw of this subject at `target` (3,) m with `speed` m/s; `chance` makes it differ from the one before.
 
-    InputError as for `throws.throw`.
-    """
+    InputError as for `throws.throw`."""
     manner = scatter_manner(thrower.manner, _THROW_SCATTER, chance)
     effort = float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
     style = style_throw(STYLES["overarm"], manner, effort)

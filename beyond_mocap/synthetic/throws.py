@@ -46,8 +46,7 @@ class ThrowStyle:
     pelvis, spine: rows (time, list, tilt, turn), the pelvis against the throwing direction, the chest against the
     pelvis. right_arm, left_arm: rows (time, brought forward across, abduction, inward turn, elbow). forearm: rows
     (time, turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead,
-    left, raised, pitch, yaw).
-    """
+    left, raised, pitch, yaw)."""
 
     pelvis: tuple
     spine: tuple
@@ -110,8 +109,7 @@ class Throw:
     """A made throw.
 
     motion: the body. release: seconds at which the ball leaves the hand. arm: "left" or "right". position, velocity:
-    (3,) m and m/s of the ball's centre then. grip: (3,) metres, the ball's centre in the hand joint's own axes.
-    """
+    (3,) m and m/s of the ball's centre then. grip: (3,) metres, the ball's centre in the hand joint's own axes."""
 
     motion: Motion
     release: float
@@ -129,8 +127,7 @@ def throw(
 
     speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
     adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown
-    arm or style, a body without hands.
-    """
+    arm or style, a body without hands."""
     how = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)

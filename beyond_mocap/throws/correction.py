@@ -63,8 +63,7 @@ class Corrected:
     seconds: until it is at the target, and miss: m that it passes by. moved: m that the wrist or ankle was moved at
     most, by `shift` (T, 3) m at each frame; turned: rad that the body was turned about its start; pace: the factor on
     its speed; later: s that the ball leaves after it would have at that pace; elsewhere: m that the body begins
-    beside where it began. gap: m between foot and ball, 0 for throws.
-    """
+    beside where it began. gap: m between foot and ball, 0 for throws."""
 
     motion: Motion
     frame: float
@@ -95,8 +94,7 @@ def corrected(
 
     speed: m/s wished for as it leaves; it gives way where the body's own is far from it. hold: what keeps the limb's
     joints within their limits; where that leaves no way to the target the ball misses. InputError: a body without that
-    limb, a release at the motion's very ends, a target where the ball is.
-    """
+    limb, a release at the motion's very ends, a target where the ball is."""
     freedom = freedom or Freedom()
     target = np.maximum(np.asarray(target, float), [-np.inf, -np.inf, ball.radius])
     part.chain(motion)

@@ -59,8 +59,7 @@ class ThrowFigures:
     target, which tells what scaling does to a flight. head: degrees between the heads' rotations. head_share: how much
     the head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the
     example's. bones m: by how much the bone that changes most changes. beyond: share of rotations beyond the joints'
-    limits, NaN where the model knows none. seconds: that it took, of `duration` s.
-    """
+    limits, NaN where the model knows none. seconds: that it took, of `duration` s."""
 
     name: str
     subject: str
@@ -257,8 +256,7 @@ def let_go(
     """Place (3,) m and velocity (3,) m/s at the fractional frame `release` of a ball that a hand joint holds.
 
     grip: (3,) m, the ball's centre in the joint's own axes. shift: (T, 3) m, how far from the motion's the hand is in
-    each frame, for networks whose joints float.
-    """
+    each frame, for networks whose joints float."""
     from scipy.interpolate import CubicSpline
 
     frames = np.clip(release + np.array([-_HALF, 0.0, _HALF]), 0.0, len(motion) - 1)

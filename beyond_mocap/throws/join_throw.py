@@ -55,8 +55,7 @@ class JoinedThrow:
     first, end: frames first .. end of it show the throw from its first to its last.
     kept: (2,) frames between which it is exactly as generated.
     moved, turned: (3,) m and rad by which what follows was moved and turned about the vertical to go on from there.
-    warnings: lines for people.
-    """
+    warnings: lines for people."""
 
     motion: Motion
     start: float

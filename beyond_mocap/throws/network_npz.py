@@ -46,8 +46,7 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
     """The model that a file holds; float16 weights come as float32.
 
     InputError, one line that begins with the file's name, for whatever is wrong: missing, cut short, of something else,
-    a value that is no number, shapes that do not fit.
-    """
+    a value that is no number, shapes that do not fit."""
     data = content(path, _KIND, LARGEST)
     try:
         arrays = plain_arrays(data, _KIND, _FLOATS, UNPACKED, _OTHERS)
@@ -70,8 +69,7 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
     """Write a model as `read_model` reads it, number for number; the same model gives the same bytes.
 
     half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights
-    that are shipped. InputError where it cannot be written, or where a weight is too large for float16.
-    """
+    that are shipped. InputError where it cannot be written, or where a weight is too large for float16."""
     arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
     arrays |= {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
     arrays |= {name: one for name in ("joint_limits", "reference") if (one := getattr(model, name)) is not None}

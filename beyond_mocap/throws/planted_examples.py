@@ -129,8 +129,7 @@ def write_planted(
     """Makes `count` throws (or kicks, by `action`) of each of `subjects` people in `folder`; how many there are then.
 
     The folder comes whole or not at all. seed: of the first subject, the others follow. InputError where the folder has
-    files, or cannot be written.
-    """
+    files, or cannot be written."""
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
     with whole_folder(folder) as part:
@@ -168,8 +167,7 @@ class Kick:
     """A made kick.
 
     motion: the body. contact: s at which the foot meets the ball. foot: "left" or "right". ball: (3,) m, where the
-    ball's centre lies until then. velocity: (3,) m/s and spin: (3,) rad/s, as it leaves.
-    """
+    ball's centre lies until then. velocity: (3,) m/s and spin: (3,) rad/s, as it leaves."""
 
     motion: Motion
     contact: float
@@ -187,8 +185,7 @@ def kick(
 
     speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
     adult. style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown
-    foot or style.
-    """
+    foot or style."""
     how = choose_style("kick", foot, "foot", style=style, styles=KICKS, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     return _Aim(how, neutral, foot, ball).at(np.asarray(target, dtype=float), speed, fps)
@@ -260,8 +257,7 @@ def _slopes(ends: np.ndarray) -> np.ndarray:
 def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarray:
     """The centre (3,) m of a ball on the ground that the foot's line (2, 3) m touches as it comes with `velocity` (3,).
 
-    A foot that points down meets it where its line is square to where it goes; a level one with its inside.
-    """
+    A foot that points down meets it where its line is square to where it goes; a level one with its inside."""
     line = ends[1] - ends[0]
     along, far = line / np.linalg.norm(line), FOOT_RADIUS + radius
     normal = velocity - velocity @ along * along

@@ -64,8 +64,7 @@ class RunUpResult:
     motion: all of it.
     start: seconds of its first frame on the track's clock.
     seams: frames that begin another clip.
-    warnings: lines for people.
-    """
+    warnings: lines for people."""
 
     motion: Motion
     start: float

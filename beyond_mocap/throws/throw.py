@@ -60,8 +60,7 @@ def throw_at(
     """A throw or kick as ordered, on `skeleton` (any humanoid; None: the model's).
 
     InputError: a limb that the skeleton lacks or the model was not trained for, a target that no human or none of the
-    model's examples reaches.
-    """
+    model's examples reaches."""
     def told(share: float, text: str) -> None:
         if cancelled and cancelled():
             raise Cancelled("cancelled")

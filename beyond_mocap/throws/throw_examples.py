@@ -51,8 +51,7 @@ def examples_in(
     skeleton: bring all of them to this one; None leaves each its own. told: gets one line for each throw that is left
     out, and why, and one for all recordings without any. mirror: of each also its mirror image, done with the other
     hand or foot. InputError: no folder, no example in it, a table that cannot be read, a skeleton without hands or
-    feet.
-    """
+    feet."""
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
     if skeleton is not None:

@@ -35,8 +35,7 @@ class Order:
     as far above it as a foot gets. None: start at the origin. The body faces as the examples do, against the target.
     release_time: s on the caller's clock at which the ball leaves, None: the motion begins at 0. fps: of the result,
     None: the model's. seed: another motion with the same aim. freedom: what the correction may change beside wrist or
-    ankle.
-    """
+    ankle."""
 
     target: tuple[float, float, float]
     limb: str | None = None
@@ -86,8 +85,7 @@ class Thrown:
     and feet were off their wanted ways before any inverse kinematics, on average.
     beyond: rad that a joint of the corrected limb is beyond the model's limits at most, which is nothing but what other
     bones or another rate have made of it before anything was corrected. examples: names and weights of what it was
-    planned from. warnings: lines for people.
-    """
+    planned from. warnings: lines for people."""
 
     motion: Motion
     start_time: float

@@ -28,8 +28,7 @@ def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
     """Play `motion` on the armature `body`: a new action `name` with a key on every whole scene frame.
 
     start: scene frame (may be fractional) at which the motion's first frame is played; the scene's first if None. The
-    armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action.
-    """
+    armature needs a bone for every joint. generated: as for `channels.animate`. Returns the action."""
     frames, curves = keyed(body, motion, scene, start)
     action = channels.animate(body, name or f"{body.name} motion", frames, curves, generated)
     action[PLACED] = [number for row in body.matrix_world for number in row]
@@ -39,8 +38,7 @@ def write(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start:
 def keyed(body: bpy.types.Object, motion: Motion, scene: bpy.types.Scene, start: float | None = None):
     """What `write` writes, as `channels.animate` takes it: whole scene frames (F,), and the values of every curve.
 
-    InputError where the armature cannot play it.
-    """
+    InputError where the armature cannot play it."""
     channels.check_local(body)
     channels.check_free(body)
     if getattr(body, "beyond_mocap_ride", None) is not None and body.beyond_mocap_ride.on:  # not there for batch.py
@@ -71,8 +69,7 @@ def read(body: bpy.types.Object, scene: bpy.types.Scene, action: bpy.types.Actio
     """The motion that an action plays on the armature `body`, at the scene's frame rate, from first key to last.
 
     action and slot: those that the armature plays if None. Curves of any rotation mode are read; what has no curve
-    stays as it is posed now. Constraints and drivers are not part of an action and not read.
-    """
+    stays as it is posed now. Constraints and drivers are not part of an action and not read."""
     if action is None:
         action, slot = channels.playing(body)
     if action is None:

@@ -26,8 +26,7 @@ class Job:
 
     `work(progress, cancelled, hurry)` is called there; `hurry()` turns true when the user wants an end and what is
     there by then. `fraction` and `text` say how far it is; after `poll()` has returned True either `result` or `error`
-    is set.
-    """
+    is set."""
 
     def __init__(self, kind: str, work: Work, keeps: bool = False):
         """Starts at once and takes the place of an older job of the same kind, which is cancelled. keeps: whether the

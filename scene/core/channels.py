@@ -27,8 +27,7 @@ def animate(target: bpy.types.Object, name: str, frames: np.ndarray, channels: d
 
     frames: (F,) scene frames, rising. channels: data path -> (name of the curves' group, values (F, n), or (1, n) for
     one key on the first frame). generated: whether the keys are to be told from hand-made ones by their type. The
-    action that was there before is kept in the file. InputError as `check_free`.
-    """
+    action that was there before is kept in the file. InputError as `check_free`."""
     check_free(target)
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type=target.id_type, name=target.name)
@@ -96,8 +95,7 @@ def discard(target: bpy.types.Object, mark: str) -> None:
     """Take off and remove the action that `target` plays, if it carries the custom property `mark` and has no other
     user.
 
-    For results that are made again and again, so that they do not pile up in the file.
-    """
+    For results that are made again and again, so that they do not pile up in the file."""
     action, _ = playing(target)
     if action is not None and action.get(mark) and action.users - action.use_fake_user == 1:
         target.animation_data.action = None
@@ -168,8 +166,7 @@ def built(name: str, slot_name: str, tables: dict, like: dict):
     """A new action `name` with one slot, and that slot.
 
     tables: (data path, array index) -> keys as of `keys_of`. like: (data path, array index) -> a curve whose group,
-    extrapolation, lock and mute are taken over.
-    """
+    extrapolation, lock and mute are taken over."""
     action = bpy.data.actions.new(name)
     slot = action.slots.new(id_type="OBJECT", name=slot_name)
     bag = _channelbag(action, slot)

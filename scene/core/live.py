@@ -56,8 +56,7 @@ class Watcher:
     held_by: names of operators, beside HOLDING, during which the hand does not rest
     look(): called all the time; seconds until the next time
     draws: (type of space, function, "POST_VIEW" or "POST_PIXEL") of what is drawn over its main regions
-    ends(): the extension is switched off: stop what runs, forget what was made
-    """
+    ends(): the extension is switched off: stop what runs, forget what was made"""
 
     name: str
     matters: tuple[type, ...] = ()

@@ -80,8 +80,7 @@ def open_editor(context: bpy.types.Context, kind: str, direction: str, factor: f
     becomes one.
 
     direction: "VERTICAL" splits into left and right, "HORIZONTAL" into below and above; factor: the new editor's share.
-    None without a window, or where the screen has no 3D view to split.
-    """
+    None without a window, or where the screen has no 3D view to split."""
     window = context.window
     if bpy.app.background or window is None:
         return None

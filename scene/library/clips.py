@@ -137,8 +137,7 @@ def active(manager: bpy.types.WindowManager) -> BeyondMocapClip | None:
 def list_files(folder: str) -> dict[str, tuple[int, int]] | None:
     """All recordings and words below a folder: path -> (size, time of change in ns); None where there is no folder.
 
-    Plain strings and as few calls as can be, since it shares the interpreter with the window.
-    """
+    Plain strings and as few calls as can be, since it shares the interpreter with the window."""
     if not os.path.isdir(folder):
         return None
     found = {}

@@ -32,8 +32,7 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     """Runs `beyond-mocap ARGUMENTS --json` and returns its notes; in any thread.
 
     Cancelled: somebody wanted out, and it has ended; what was finished is kept. BeyondMocapError: what the command told
-    when it ended otherwise.
-    """
+    when it ended otherwise."""
     while _running:  # one that was cancelled comes to its end
         progress(0.0, "waiting for what was cancelled to end")
         if cancelled():

@@ -97,8 +97,7 @@ def cloth(kit: Kit, part: str) -> bpy.types.Material:
     """A material for one part of a kit ("shirt", "number", or one of the body's), in the kit's present colour.
 
     What another match or anybody else wears is not taken: each call for a part of the kit's own gives another material
-    as soon as the one before is worn. Skin, hair and boots are everybody's.
-    """
+    as soon as the one before is worn. Skin, hair and boots are everybody's."""
     own = _own(kit)
     if part not in own:
         return colour(part.capitalize(), LOOKS[part])

@@ -67,8 +67,7 @@ def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float
             cancelled: Callable[[], bool]) -> tuple["Library", Scenery, tuple[str, ...]]:
     """The library (built where it is None), everybody's motion, and lines about whoever cannot be shown.
 
-    InputError where the folder holds no match, nobody of it is there in that time, or the library is another one.
-    """
+    InputError where the folder holds no match, nobody of it is there in that time, or the library is another one."""
     from ...beyond_mocap.files.tables import read_ball
     from ...beyond_mocap.library.build import build
 

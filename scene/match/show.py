@@ -26,8 +26,7 @@ SHOWN = "Shown"  # group of curves
 def show(context: bpy.types.Context, scenery: Scenery, first: int) -> dict[str, float]:
     """Put a stretch of a match into the scene, its start on scene frame `first`; what was shown before goes.
 
-    Returns how many seconds pitch, bodies, keys and cameras took.
-    """
+    Returns how many seconds pitch, bodies, keys and cameras took."""
     scene, took = context.scene, {}
     ours.clear(scene)
     ours.include(context.view_layer)

@@ -76,8 +76,7 @@ class Prepared:
 
     start: the first second; fps: frames per second; count: frames. meshes: overlay -> its meshes. pelvis (T, 3) m; toes
     (T, 2, 3) m and stands (T, 2) of left and right foot; figures (T, J, 3) m, pairs (B, 2) and pair_colours (2 B, 4) of
-    stick figures. seams: frames. pieces, labels: in the order of time.
-    """
+    stick figures. seams: frames. pieces, labels: in the order of time."""
 
     start: float
     fps: float

@@ -18,8 +18,7 @@ CIRCLE = 24
 def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.ndarray, height: float):
     """Shoe soles of N stances as triangles (N * K * 3, 3) and as outlines, lines (N * K * 2, 3), with K corners each.
 
-    heel, toe (N, 2) m of the joints; direction (N,) radians; side (N,) 0 left, 1 right; height m above the ground.
-    """
+    heel, toe (N, 2) m of the joints; direction (N,) radians; side (N,) 0 left, 1 right; height m above the ground."""
     span = np.linalg.norm(toe - heel, axis=1)
     jointed = span > 0.02
     length = np.where(jointed, np.clip(1.9 * span, *LENGTHS), USUAL)

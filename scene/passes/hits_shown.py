@@ -45,8 +45,7 @@ def analyse(
     """Find the strikes in an armature's motion, note them for the panel and mark them on its action.
 
     part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to
-    mark.
-    """
+    mark."""
     from ...beyond_mocap.passes.hits import analyse as find
 
     channels.check_local(body)
@@ -138,8 +137,7 @@ def picture(found: dict) -> np.ndarray:
 
     Above the height of the part, below its speed. Thin red lines stand where it is highest, magenta ones where it is
     fastest, as in the paper; at the foot red bars are the stretches in which a ball can be hit, blue ones the hit
-    motions.
-    """
+    motions."""
     image = np.empty((SIZE, SIZE, 4), np.float32)
     image[..., :3], image[..., 3] = _GROUND, 1.0
     count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2

@@ -254,8 +254,7 @@ def hit_of(
     """The strongest strike by `part` in the stretch that a pass names of its armature's motion.
 
     number: of the pass, from 1, for errors. part, side ("": the stronger one), tool: of who strikes. InputError: the
-    armature is gone, is one of the scene's own bodies, does not move, or does not strike there.
-    """
+    armature is gone, is one of the scene's own bodies, does not move, or does not strike there."""
     body, where = row.actor, f"pass {number}: Like Armature"
     if body is None or body.name not in scene.objects:
         raise InputError(where, f"{row.actor_known or body.name} is not in the scene any more",

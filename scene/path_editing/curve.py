@@ -117,8 +117,7 @@ def create(
     """A curve object along a path, or a straight line as long, from its beginning toward its end.
 
     count: control points; 0 takes as many as it needs to be within 3 cm. kind: BEZIER or NURBS; degree: of the NURBS.
-    InputError where there are too few points for the degree.
-    """
+    InputError where there are too few points for the degree."""
     points, handles = _fitted(path, count, kind, degree, straight)
     units = units_per_metre(context.scene)
     origin = points[0] * units

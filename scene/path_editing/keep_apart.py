@@ -73,8 +73,7 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
     """What these riders have to do to keep apart within `limits` of the core; the scene stays as it is.
 
     All other riders stay where they are, and so do those who ride nowhere (see `bystanders`). InputError where a rider
-    cannot ride.
-    """
+    cannot ride."""
     from ...beyond_mocap.path_editing.apart import resolved
     from ...beyond_mocap.path_editing.detour import Change
 

@@ -88,8 +88,7 @@ def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, dig
     """Let the channels hold the wanted values (N,) on whole frames from `first` on, and all others what the original
     has.
 
-    now: the digest that the action carries; digest: the one that it will carry.
-    """
+    now: the digest that the action carries; digest: the one that it will carry."""
     known = _laid.setdefault(sheet.made.session_uid, _Laid())
     sure = bool(known.digest) and known.digest == now
     known.digest = ""

@@ -27,8 +27,7 @@ class Shown:
     """What was worked out for a rider: plain numbers, in metres of the scene's world.
 
     first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is
-    worked out; told: lines for the user.
-    """
+    worked out; told: lines for the user."""
 
     first: int
     fps: float
@@ -84,8 +83,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     """Bring a rider's motion up to date with curve and settings; whether anything had to be worked out.
 
     anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it
-    was, where that makes no sense just now.
-    """
+    was, where that makes no sense just now."""
     from ...beyond_mocap.path_editing.ride import RideSettings, ride
 
     global _counted

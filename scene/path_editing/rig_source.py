@@ -28,8 +28,7 @@ class RigSource:
     """A rig as it moves.
 
     motion: what it shows, metres, at the scene's rate; start: the scene frame of its first frame; told: lines for the
-    user.
-    """
+    user."""
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
         """Looks at every frame of what the rig plays. InputError where it plays nothing, or cannot be carried."""

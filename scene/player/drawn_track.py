@@ -51,8 +51,7 @@ def read(scene: bpy.types.Scene, drawn: bpy.types.Object, start: float = 0.0, st
     InputError where it is none.
 
     still: leave the scene on its frame. What moves by more than its own keys has to be played frame by frame, which
-    takes time and undoes a pose that has no key yet; then what was read last counts, InputError where there is none.
-    """
+    takes time and undoes a pose that has no key yet; then what was read last counts, InputError where there is none."""
     if drawn.type == "CURVE":
         found = line_of(scene, drawn)
         level = found.line[:, :2]

@@ -41,8 +41,7 @@ class Order:
 
     where: the place of its words, for messages. warnings: about its track. begin: the name of the take to start from,
     before: that take, None where this session has not made it. recipe: the steps that led to it, see `recipe`. build:
-    more arguments of the core's `build`.
-    """
+    more arguments of the core's `build`."""
 
     player: str
     how: How

@@ -28,8 +28,7 @@ STUB = 0.04  # metres: length of a bone that leads nowhere
 class Placement:
     """How an armature's own space lies in the scene's metres.
 
-    rotation: (4,) unit quaternion. origin: (3,) metres. scale: metres per unit of the armature's space.
-    """
+    rotation: (4,) unit quaternion. origin: (3,) metres. scale: metres per unit of the armature's space."""
 
     rotation: np.ndarray
     origin: np.ndarray
@@ -47,8 +46,7 @@ class Placement:
 def create(context: bpy.types.Context, skeleton: Skeleton, name: str, collection=None) -> bpy.types.Object:
     """A new armature object with one bone per joint, its lowest joint on the floor, in `collection` or the scene's own.
 
-    The exact offsets in metres, the order of the joints and the tips go along as a custom property of the armature.
-    """
+    The exact offsets in metres, the order of the joints and the tips go along as a custom property of the armature."""
     scene = context.scene
     units = units_per_metre(scene)
     data = bpy.data.armatures.new(name)

@@ -35,8 +35,7 @@ class PosedRig:
             matrices = posed.pose(turns, bones)
 
     controls: the bones that are posed. layer: the view layer whose depsgraph poses the rig. silent: constraints that
-    are muted meanwhile.
-    """
+    are muted meanwhile."""
 
     def __init__(
         self, rig: bpy.types.Object, layer: bpy.types.ViewLayer, controls: Sequence[str],
@@ -49,8 +48,7 @@ class PosedRig:
         """Pose the controls, and read bones as Blender then poses them.
 
         turns: (n, 4), the controls' own rotations. places: (n, 3), their locations, at rest where None.
-        Returns (W, 4, 4), the bones' poses in the armature's space.
-        """
+        Returns (W, 4, 4), the bones' poses in the armature's space."""
         for number, (name, turn) in enumerate(zip(self.controls, turns)):
             bone = self.rig.pose.bones[name]
             bone.rotation_quaternion = turn
@@ -137,8 +135,7 @@ def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
     """By how much n frames turn within each of C bones, and within nothing.
 
     carried: (K, C, 3, 3), the bones' turns in K trials. frames: (K, n, 3, 3).
-    Returns (C + 1, n), the last row for nothing.
-    """
+    Returns (C + 1, n), the last row for nothing."""
     spread = np.empty((carried.shape[1] + 1, frames.shape[1]))
     spread[-1] = np.ptp(frames, axis=0).max(axis=(-1, -2))
     for number in range(carried.shape[1]):
@@ -150,8 +147,7 @@ def turn_spread(carried: np.ndarray, frames: np.ndarray) -> np.ndarray:
 def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) -> np.ndarray:
     """By how much n places go within each of C bones, and within nothing: (C + 1, n), as `turn_spread`.
 
-    carried: (K, C, 3, 3) and origin: (K, C, 3), the bones' turns and places. places: (K, n, 3).
-    """
+    carried: (K, C, 3, 3) and origin: (K, C, 3), the bones' turns and places. places: (K, n, 3)."""
     spread = np.empty((carried.shape[1] + 1, places.shape[1]))
     spread[-1] = np.ptp(places, axis=0).max(axis=-1)
     for number in range(carried.shape[1]):
@@ -164,8 +160,7 @@ def place_spread(carried: np.ndarray, origin: np.ndarray, places: np.ndarray) ->
 def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
     """The carrier of a bone among those before it, and its spread: the last of them, unless another is surely steadier.
 
-    spread: (C + 1,), of the bone with that `number`, as `turn_spread` has it.
-    """
+    spread: (C + 1,), of the bone with that `number`, as `turn_spread` has it."""
     best, least = STATIC, np.inf
     for d in [*range(number - 1, -1, -1), STATIC]:
         if spread[d] < _SURELY * least:
@@ -176,8 +171,7 @@ def nearest_carrier(spread: np.ndarray, number: int) -> tuple[int, float]:
 def steadiest_carrier(spread: np.ndarray, own: int) -> tuple[np.ndarray, np.ndarray]:
     """For each of n frames the steadiest bone, STATIC before all, and its spread; spread: as `turn_spread` has it.
 
-    own: so many frames are of the first bones themselves, which do not carry themselves.
-    """
+    own: so many frames are of the first bones themselves, which do not carry themselves."""
     spread, itself = spread.copy(), np.arange(own)
     spread[itself, itself] = np.inf
     spread[-1] *= _SURELY  # what does not move at all rides on nothing
@@ -190,8 +184,7 @@ def study_rides(rig: bpy.types.Object, side: bpy.types.Scene, controls: list[str
     """On which of the controls and `shown` bones each of the controls rides, as the rig stands at the side scene's
     frame, with its inverse kinematics and switches as they are.
 
-    The rig is as it was when this returns. side: the scene in which it is alone.
-    """
+    The rig is as it was when this returns. side: the scene in which it is alone."""
     carriers = [*controls, *(bone for bone in shown if bone not in controls)]
     above = [_above(rig, name) for name in controls]
     watched = list(dict.fromkeys([*carriers, *(name for name in above if name)]))

@@ -59,8 +59,7 @@ class Controls:
     def __init__(self, rig: bpy.types.Object, bones: list[str], movers: list[str], overrides: list[Override]):
         """bones: driven ones, carriers before what they carry. movers: those of them that are also moved.
 
-        overrides: constraints that are to be silent. The rig is as it was when this returns.
-        """
+        overrides: constraints that are to be silent. The rig is as it was when this returns."""
         self.rig, self.bones, self.movers = rig, list(bones), [bone for bone in bones if bone in movers]
         self.switches, self.overrides = list_switches(rig), overrides
         self.loose: list[str] = []
@@ -126,8 +125,7 @@ class Controls:
         """The channels that put the driven bones so, in the armature's space.
 
         turns: bone -> rotation matrices (F, 3, 3), for all bones; places: mover -> heads (F, 3). Returns bone ->
-        (basis rotations (F, 4), locations (F, 3) or None), and all heads (F, B, 3).
-        """
+        (basis rotations (F, 4), locations (F, 3) or None), and all heads (F, B, 3)."""
         count = len(next(iter(turns.values())))
         turn = np.stack([turns[bone] for bone in self.bones], axis=1)
         heads, out = np.zeros((count, len(self.bones), 3)), {}

@@ -130,8 +130,7 @@ def upright_turn(heads: dict[str, np.ndarray]) -> np.ndarray:
 def upright_axes(heads: dict[str, np.ndarray]) -> np.ndarray:
     """The turn (3, 3), by quarter turns, that lets a body stand along Z and face +X.
 
-    heads: part -> its place (3,) at rest, in the armature's space; thighs and feet are needed.
-    """
+    heads: part -> its place (3,) at rest, in the armature's space; thighs and feet are needed."""
     legs = [heads["left upper_leg"], heads["right upper_leg"]]
     up = nearest_axis(np.mean(legs, axis=0) - 0.5 * (heads["left foot"] + heads["right foot"]))
     across = legs[0] - legs[1]
@@ -142,8 +141,7 @@ def upright_axes(heads: dict[str, np.ndarray]) -> np.ndarray:
 def list_targets(rig: bpy.types.Object, table: dict[str, str], overrides: list[Override]) -> dict[str, str]:
     """IK targets -> the part they follow, carriers first: those of the overriding constraints, and those known by name.
 
-    table: part -> bone. Bones of the table itself follow nothing.
-    """
+    table: part -> bone. Bones of the table itself follow nothing."""
     part_of, found = {bone: part for part, bone in table.items()}, {}
     for override in overrides:
         constraint = rig.pose.bones[override.bone].constraints[override.constraint]
@@ -163,8 +161,7 @@ def list_followers(
     known names.
 
     controls, shown: part -> the bone that moves it, that shows it. near: metres of the armature within which a helper
-    bone rests where a part does.
-    """
+    bone rests where a part does."""
     part_of = {bone: part for table in (controls, shown) for part, bone in table.items()}
     trunk, held = _trunk(rig, controls), _held(rig)
     found: dict[str, str] = {}

@@ -59,8 +59,7 @@ def write(
 ) -> list[str]:
     """Write the rigs' motions; returns lines for the user. InputError where they or the file are no good.
 
-    things: meshes that no rig moves, such as a ball and a pitch, which are written beside them (not as BVH).
-    """
+    things: meshes that no rig moves, such as a ball and a pitch, which are written beside them (not as BVH)."""
     check(wanted.format)
     if not rigs:
         raise InputError("export", "no armature", "an armature that moves", "select one, or choose players")

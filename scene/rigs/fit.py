@@ -151,8 +151,7 @@ def _raised(motion: Motion, by: float) -> Motion:
 class Source:
     """A motion that a body plays, in metres at the scene's rate from scene frame `start`.
 
-    standing (T, 2) bool: feet on the ground as the take carries it; None where only the motion itself can tell.
-    """
+    standing (T, 2) bool: feet on the ground as the take carries it; None where only the motion itself can tell."""
 
     motion: Motion
     start: int
@@ -163,8 +162,7 @@ class Source:
 def source_of(body: bpy.types.Object | None, scene: bpy.types.Scene, standing=None) -> Source:
     """The motion that an armature plays: its action, or, with NLA strips, what these come to.
 
-    standing: function (frames) -> (F, 2) bool of a take, None where there is none.
-    """
+    standing: function (frames) -> (F, 2) bool of a take, None where there is none."""
     if body is None or body.type != "ARMATURE":
         raise InputError("bake to rig", "no motion", "a player with a result or an armature with an action",
                          "synthesize and accept first")

@@ -29,8 +29,7 @@ def reduce(
 ) -> tuple[int, int]:
     """Leave out keys of the action that the rig plays, driven by the bones of `table`; returns keys before and after.
 
-    tolerance: metres that hands, feet, head and moved bones may be off. turn_tolerance: radians that a bone may be.
-    """
+    tolerance: metres that hands, feet, head and moved bones may be off. turn_tolerance: radians that a bone may be."""
     playing, slot = channels.playing(rig)
     if playing is None:
         raise InputError(f"rig {rig.name}", "it plays no action", "a baked rig", "Bake to Rig first")

@@ -52,8 +52,7 @@ class BeyondMocapRigBone(bpy.types.PropertyGroup):
 def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
     """Map the bones of the chosen rig: the map kept for its skeleton, else by names and structure (always, if `again`).
 
-    Returns where the map came from. InputError where nothing is found.
-    """
+    Returns where the map came from. InputError where nothing is found."""
     from . import bone_maps
 
     rig = settings.target

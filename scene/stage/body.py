@@ -20,8 +20,7 @@ LOOKS = {  # linear RGB of what is the same on all players
 def create(player, name: str, shirt, collection, scene: bpy.types.Scene, example) -> bpy.types.Object:
     """Dress the armature `player`: a mesh named `name` with an armature modifier, as its child, in `collection`.
 
-    example: a `Motion` on the armature's skeleton; it shows how the body hangs on bones whose rest pose says little.
-    """
+    example: a `Motion` on the armature's skeleton; it shows how the body hangs on bones whose rest pose says little."""
     from ...beyond_mocap.appearance.body import MATERIALS, low_poly_body  # brings scipy, which is slow to import
 
     skeleton = armature.skeleton_of(player, scene)

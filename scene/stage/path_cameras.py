@@ -204,8 +204,7 @@ def fitted(corners: np.ndarray, axes: np.ndarray, half: np.ndarray) -> np.ndarra
 
     axes: (3, 3) the camera's own, in columns: right, up, back. half: (2,) half its frame's width and height at 1 m.
     With f the depth of a corner, it is inside where |x - X| <= (f - F) half, four half-spaces whose tips are the
-    solution.
-    """
+    solution."""
     seen = corners @ axes * [1.0, 1.0, -1.0]
     right, left = (np.max(sign * seen[:, :2] - seen[:, 2:] * half, axis=0) for sign in (1.0, -1.0))
     depth = float(np.min(-(right + left) / (2.0 * half)))

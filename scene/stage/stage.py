@@ -71,8 +71,7 @@ def follow(scene: bpy.types.Scene, frames: np.ndarray, places: np.ndarray, reach
     """Let the stage's camera follow and stand back as far as it takes; nothing happens where there is no such camera.
 
     frames: (F,) scene frames. places: (F, 2) metres, the middle of what is to be seen. reach: (F,) metres from there to
-    the farthest player. The camera hangs on an empty, whose size is its distance.
-    """
+    the farthest player. The camera hangs on an empty, whose size is its distance."""
     target = focus(scene)
     if target is None:
         return

@@ -46,8 +46,7 @@ class Order:
     release on, (1, 3) of one that stands. at: s of the release; begins: s of the scene's first frame; waits: whether
     the release may come later so that the throw does not begin before that. speed: m/s, 0 as usual. ball_place: (3,) m
     where a ball that is kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
-    the library's, "" for none; build: how it is built. digest: of the settings.
-    """
+    the library's, "" for none; build: how it is built. digest: of the settings."""
 
     body: str
     act: str

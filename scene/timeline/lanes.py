@@ -33,8 +33,7 @@ class PlacedSpan:
     """A span and the strip that says it.
 
     track, strip: names. first, last: frames of the strip's ends. off: muted, so that nobody asks for it. automatic:
-    put in by the last synthesis and untouched since.
-    """
+    put in by the last synthesis and untouched since."""
 
     span: Span
     track: str
@@ -82,8 +81,7 @@ def written_for(target: bpy.types.Object) -> Clock | None:
 def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
     """What the strips ask for; None where the object has no lanes.
 
-    where: whose they are, for messages. InputError for a strip or marker whose name is not of the text form.
-    """
+    where: whose they are, for messages. InputError for a strip or marker whose name is not of the text form."""
     if not has(target):
         return None
     asked = [placed.span for placed in spans(target, where) if not placed.off and not placed.automatic]
@@ -93,8 +91,7 @@ def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
 def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
     """All spans by start, those that are off and automatic ones too; InputError as `read`.
 
-    An automatic strip that was moved, renamed, unmuted or put on another lane is asked for from then on.
-    """
+    An automatic strip that was moved, renamed, unmuted or put on another lane is asked for from then on."""
     clock, where = written_for(target), where or target.name
     found = [placed_span(track, strip, clock, where) for track, strip in strips(target)
              if strip.action.beyond_mocap.kind != "moments"]
@@ -114,8 +111,7 @@ def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
     """All key moments by time; InputError as `read`.
 
     A marker beyond the ends of its strip is not seen and does not count; what several strips show on the same frame,
-    since one is a copy of the other, counts once.
-    """
+    since one is a copy of the other, counts once."""
     clock, where, found = written_for(target), where or target.name, {}
     for track, strip in strips(target):
         for index, marker in enumerate(strip.action.pose_markers):

@@ -20,8 +20,7 @@ def write(target: bpy.types.Object, timeline: Timeline, clock: Clock,
           extent: tuple[float, float] | None = None) -> None:
     """Let the strips say `timeline`, in place of all that they asked for; automatic ones stay.
 
-    extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it.
-    """
+    extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it."""
     own(target, clock)
     for track, strip in list(lanes.strips(target)):
         if strip.action.beyond_mocap.kind != "automatic":

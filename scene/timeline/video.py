@@ -62,8 +62,7 @@ def load(path: str) -> bpy.types.MovieClip:
 def show(scene: bpy.types.Scene, clip: bpy.types.MovieClip, rate: float | None = None) -> None:
     """Let `clip` be the scene's reference video, driven at its rate; where it begins stays as it is.
 
-    rate: frames per second, None for what a movie says, and for an image sequence the scene's own rate.
-    """
+    rate: frames per second, None for what a movie says, and for an image sequence the scene's own rate."""
     video = scene.beyond_mocap.video
     release(scene)
     video.clip = clip

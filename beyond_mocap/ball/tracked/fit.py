@@ -78,8 +78,7 @@ class Launches:
 def gathered(times, positions, measured, used, spans) -> Stretches:
     """The stretches of (start, end, start place (3,), end place (3,), start velocity (3,)) `spans` with their samples.
 
-    times (N,), positions (N, 3), measured and used (N,) bool: the feed's.
-    """
+    times (N,), positions (N, 3), measured and used (N,) bool: the feed's."""
     begins = np.array([span[0] for span in spans])
     ends = np.array([span[1] for span in spans])
     first, last = np.searchsorted(times, begins, "right"), np.searchsorted(times, ends, "left")

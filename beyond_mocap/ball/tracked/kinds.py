@@ -56,8 +56,7 @@ def part_of(height: float | None) -> str:
 def kind_of(part: str, before: np.ndarray, after: np.ndarray, same_next: bool, same_before: bool) -> str:
     """The word for a touch by foot, chest or head: before, after (3,) m/s relative to the player.
 
-    same_next, same_before: whether the same player has the next touch, had the one before.
-    """
+    same_next, same_before: whether the same player has the next touch, had the one before."""
     fast_in, fast_out = np.linalg.norm(before[:2]), np.linalg.norm(after[:2])
     if part == "head":
         return HEADER
@@ -79,8 +78,7 @@ def _is_deflection(before, after, fast_in, fast_out, same_next) -> bool:
 def is_throw_in(place: np.ndarray, before: np.ndarray, after: np.ndarray, since: float, width: float) -> bool:
     """Whether a ball that nobody has touched for `since` s, slow, on its line or held there, leaves it by a throw-in.
 
-    place (3,) m; before, after (3,) m/s.
-    """
+    place (3,) m; before, after (3,) m/s."""
     on_line = abs(place[1]) > width / 2.0 - _ON_LINE
     held = place[2] > CHEST
     slow = np.linalg.norm(before[:2]) < _STOPPED
@@ -96,8 +94,7 @@ def leaves_line(place: np.ndarray, after: np.ndarray, width: float) -> bool:
 def keeper_kind(place: np.ndarray, before: np.ndarray, goal: float, known_height: bool) -> tuple[str, str] | None:
     """Part and word of a touch by a goalkeeper in his area: a save of a shot, or a ball taken with the hands.
 
-    place (3,) m, before (3,) m/s; goal: x of his goal line. None where it is a touch like any other's.
-    """
+    place (3,) m, before (3,) m/s; goal: x of his goal line. None where it is a touch like any other's."""
     away = abs(goal - place[0])
     if away > AREA_DEPTH or abs(place[1]) > AREA_WIDTH / 2.0:
         return None

@@ -17,8 +17,7 @@ class BallPiece:
 
     times: (n,) s, n >= 2, from its start to its end; positions (n, 3) m of the centre and velocities (n, 3) m/s then.
     kind: "flight", "roll" or "still". spin: (3,) rad/s at its start.
-    residual: m, root mean square over the ground to the measured samples, NaN where there are none. bounces: (k,) s.
-    """
+    residual: m, root mean square over the ground to the measured samples, NaN where there are none. bounces: (k,) s."""
 
     times: np.ndarray
     positions: np.ndarray

@@ -34,8 +34,7 @@ class Fits:
     """K pieces over samples first[k] .. last[k] (inclusive).
 
     begin: (K,) s, the origin of each. coefficients: (K, 4, D): p, v, a/2, j/6. cost: (K,) half the weighted squares.
-    inverse: (K, 4, 4) covariance of one coordinate's coefficients.
-    """
+    inverse: (K, 4, 4) covariance of one coordinate's coefficients."""
 
     first: np.ndarray
     last: np.ndarray
@@ -82,8 +81,7 @@ def fit_between(times: np.ndarray, points: np.ndarray, weights: np.ndarray, cuts
     """Pieces between all pairs of cuts that are at most `longest` seconds (and `steps` cuts) apart.
 
     times: (N,) s. points: (N, D) m, any number where weights (N,) (1 / m^2) are zero. cuts: (C,) growing indices; a
-    piece between cuts a and b has the samples a .. b - 1. Neighbouring cuts always make a piece.
-    """
+    piece between cuts a and b has the samples a .. b - 1. Neighbouring cuts always make a piece."""
     parts = []
     for low in range(0, len(cuts) - 1, _CHUNK):
         starts = np.arange(low, min(low + _CHUNK, len(cuts) - 1))

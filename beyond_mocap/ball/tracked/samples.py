@@ -28,8 +28,7 @@ class Samples:
     times: (N,) s, growing. positions: (N, 3) m of its centre, z NaN where the feed has no height; known (N,) bool,
     whether x and y are numbers. filled: (N,) bool, made by the feed at constant velocity. outlier: (N,) bool, single
     samples far from both neighbours. scatter: (N,) m, standard deviation of x and of y around it. interval: s, the
-    usual step.
-    """
+    usual step."""
 
     times: np.ndarray
     positions: np.ndarray
@@ -54,8 +53,7 @@ def read_samples(times: np.ndarray, ball: np.ndarray, where: str = "ball") -> Sa
     """The samples of a feed: times (N,) s, ball (N, 3) m, NaN where unknown.
 
     Samples whose time is no number, or not after the one before, are left out. InputError where fewer than five have a
-    place.
-    """
+    place."""
     times, ball = np.asarray(times, float), np.asarray(ball, float)
     ball = np.where(np.abs(ball) < _FARTHEST, ball, np.nan)
     keep = np.isfinite(times)

@@ -44,8 +44,7 @@ class SolvedTouch:
 
     time: s; uncertainty: s, standard deviation. player: id, "" where nobody tracked was near. part: "foot", "head",
     "chest" or "hand". kind: one of `kinds.KINDS`. position: (3,) m, the ball's centre. before, after: (3,) m/s of the
-    ball. confidence: 0 to 1, that there was a touch and that it was this player's.
-    """
+    ball. confidence: 0 to 1, that there was a touch and that it was this player's."""
 
     time: float
     uncertainty: float
@@ -68,8 +67,7 @@ class SolvedBall:
 
     times: (N,) s of the samples. touches: in order. ball: the path, `.at(times)`, with its pieces. filled, outlier,
     measured: (N,) bool. residuals: (N,) m over the ground from each sample to the path, NaN where unknown. ends: where
-    the ball left the pitch. confidence: 0 to 1, the touches' mean. notes: lines for people.
-    """
+    the ball left the pitch. confidence: 0 to 1, the touches' mean. notes: lines for people."""
 
     times: np.ndarray
     touches: tuple[SolvedTouch, ...]
@@ -93,8 +91,7 @@ def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: S
     """Solves a feed: times (N,) s, ball (N, 3) m with NaN where unknown, positions (P, N, 2) m of the `players`.
 
     teams: (P,) names, () where unknown. pitch: length, width m. where: the feed's name, for messages. InputError where
-    the ball has fewer than five samples, or never so many without a long gap.
-    """
+    the ball has fewer than five samples, or never so many without a long gap."""
     samples = read_samples(times, ball, where)
     every, first = np.unique(np.asarray(times, float), return_index=True)
     positions = np.asarray(positions, float)[:, first[np.searchsorted(every, samples.times)]]
@@ -346,8 +343,7 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
     """Touches and the path of the ball in `source`, or from `start` to `end` seconds of it.
 
     A track has one player: touches of others have the player "". Referees touch no ball. InputError where the source
-    has no ball then.
-    """
+    has no ball then."""
     low, high = -np.inf if start is None else start, np.inf if end is None else end
     part = (source.times >= low) & (source.times <= high)
     if not part.any():

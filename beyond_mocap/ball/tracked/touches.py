@@ -40,8 +40,7 @@ class Cuts:
     """The cuts that remain, in order, C of them, and the C + 1 pieces around them.
 
     time: (C,) s between two samples. spread: (C,) s. touch: (C,) bool, else free. margin: (C,) nats by which the other
-    kind is dearer. before, after: (C, D) m/s; place: (C, D) m.
-    """
+    kind is dearer. before, after: (C, D) m/s; place: (C, D) m."""
 
     time: np.ndarray
     spread: np.ndarray
@@ -56,8 +55,7 @@ class Cuts:
 def solve_cuts(times, points, weights, cuts, player_cost) -> Cuts:
     """The likeliest choice among `cuts` (growing sample indices, the first 0 and the last N).
 
-    player_cost: (len(cuts),) nats for the nearest player being the one who touches there.
-    """
+    player_cost: (len(cuts),) nats for the nearest player being the one who touches there."""
     pieces = fit_between(times, points, weights, cuts=cuts, longest=_LONGEST, steps=_STEPS)
     begin = np.searchsorted(cuts, pieces.first)
     upto = np.searchsorted(cuts, pieces.last + 1)
@@ -197,8 +195,7 @@ def _chosen(pieces: Fits, times, cuts, player_cost) -> Cuts:
 def player_distances(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, at: np.ndarray) -> np.ndarray:
     """(P, K) m over the ground from each player to the ball at moments `at` (K,), inf where a player is not there.
 
-    times: (N,) s; ball: (K, 2) m, where it is then; positions: (P, N, 2) m.
-    """
+    times: (N,) s; ball: (K, 2) m, where it is then; positions: (P, N, 2) m."""
     out = np.full((len(positions), len(at)), np.inf)
     after = np.clip(np.searchsorted(times, at), 1, len(times) - 1)
     share = np.clip((at - times[after - 1]) / (times[after] - times[after - 1]), 0.0, 1.0)[:, None]
@@ -220,8 +217,7 @@ def reach_cost(away: np.ndarray, height: np.ndarray | None, stranger: float = ST
 def choose_players(away: np.ndarray, times: np.ndarray, between: np.ndarray, stranger: float = STRANGER) -> np.ndarray:
     """(K,) the player of every touch, -1 for nobody: the cheapest chain by dynamic programming over the touches.
 
-    away: (P, K) m. times: (K,) s. between: (P, K) m, a player's mean distance from the ball since the touch before.
-    """
+    away: (P, K) m. times: (K,) s. between: (P, K) m, a player's mean distance from the ball since the touch before."""
     players, count = away.shape
     if not count:
         return np.zeros(0, int)

@@ -109,8 +109,7 @@ class Setting:
 def add_fields(rows: Iterable[Setting]) -> Callable[[type], type]:
     """Make a class decorator, to stand under `dataclass`: a field for each of `rows` that the class does not spell out.
 
-    The fields are marked as later ones: what was saved before there was the setting stays up to date.
-    """
+    The fields are marked as later ones: what was saved before there was the setting stays up to date."""
 
     def add(cls: type) -> type:
         for row in rows:

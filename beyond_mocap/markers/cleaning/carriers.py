@@ -31,8 +31,7 @@ class Carried:
     helpers: indices of the markers that carry it, () where none do. shape: theirs. fit: their frame in the world.
     trusted: (T,) bool, where that frame is sound and its helpers lie as usual. local: (T, 3) m, the marker in that
     frame, NaN where it is not seen or the frame not trusted. place: (3,) m, its median. sigma: m, how far it usually is
-    from there.
-    """
+    from there."""
 
     helpers: tuple[int, ...]
     shape: Shape | None
@@ -84,8 +83,7 @@ def carriers(positions: np.ndarray, soft: np.ndarray, wanted: Iterable[int],
     """Marker -> how it is carried, for `wanted` markers of positions (T, M, 3) m.
 
     soft: (M, M) m from `softness`. known: an earlier look, of whose markers a few samples have `changed`: their shapes
-    still hold. ask: called for each marker; it may raise.
-    """
+    still hold. ask: called for each marker; it may raise."""
     found, changed = {}, set(changed)
     for marker in wanted:
         ask()
@@ -123,8 +121,7 @@ def carried(positions: np.ndarray, marker: int, helpers: Sequence[int], shape: S
 def helpers_of(marker: int, soft: np.ndarray, positions: np.ndarray, most: int = _MOST_HELPERS) -> tuple[int, ...]:
     """Up to `most` markers that keep their distances from this one and from each other; () where fewer than three do.
 
-    They are not on one line. soft: (M, M) m.
-    """
+    They are not on one line. soft: (M, M) m."""
     order = [other for other in np.argsort(soft[marker], kind="stable").tolist() if other != marker]
     for tolerance in _TOLERANCES:
         chosen: list[int] = []

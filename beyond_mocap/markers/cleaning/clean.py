@@ -33,8 +33,7 @@ class Stretch:
     """Something that was found between two moments.
 
     labels: the markers concerned. start, end: seconds on the trial's clock, the first frame and the last. frames: how
-    many. how: what was done, in a word; "" where nothing could be. off: m, how far off its place it was.
-    """
+    many. how: what was done, in a word; "" where nothing could be. off: m, how far off its place it was."""
 
     labels: tuple[str, ...]
     start: float
@@ -55,8 +54,7 @@ class CleanReport:
     seen: label -> share of the frames in which the recording sees it. gaps: what was filled; how is "cluster", "soft"
     or "spline". left: gaps that stay. swaps: how is "mended" or ""; the labels stand in pairs. jumps: samples taken out
     (filled again where a gap is). assigned: (unlabeled marker, label). strayed: markers that stay far from where their
-    cluster says. unnamed: unlabeled markers that remain, with the share of frames.
-    """
+    cluster says. unnamed: unlabeled markers that remain, with the share of frames."""
 
     seen: Mapping[str, float] = field(default_factory=dict)
     gaps: tuple[Stretch, ...] = ()
@@ -207,8 +205,7 @@ def clean(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]] | None = Non
     """A trial without swaps, jumps and the gaps that can be filled, and a report.
 
     clusters: segment -> labels of its markers, where a marker set is known (labels that the trial lacks are skipped);
-    None: what moves together is found from the trial alone. Raises Cancelled.
-    """
+    None: what moves together is found from the trial alone. Raises Cancelled."""
     clusters = clusters or {}
     known = [label for labels in clusters.values() for label in labels]
     index = {label: i for i, label in enumerate(trial.labels)}

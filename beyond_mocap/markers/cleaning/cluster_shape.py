@@ -21,8 +21,7 @@ class Shape(NamedTuple):
 
     places: (N, 3) m in the cluster's own frame (about its middle, turned as in the frame it was begun with), NaN for a
     marker that is never seen with the others. sigma: (N,) m, how far each marker usually is from its place (robust root
-    mean square). usual: m, the median over frames of the deformation (the fit's rms).
-    """
+    mean square). usual: m, the median over frames of the deformation (the fit's rms)."""
 
     places: np.ndarray
     sigma: np.ndarray
@@ -33,8 +32,7 @@ def mean_shape(positions: np.ndarray) -> Shape:
     """The robust mean shape of one cluster (T, N, 3) m, unseen markers NaN: generalized Procrustes.
 
     Every frame is laid on the shape by its best rigid motion, and the shape becomes the mean of what lies there; frames
-    and samples far off (swaps, ghosts) count ever less (Geman-McClure weights at three times the usual distance).
-    """
+    and samples far off (swaps, ghosts) count ever less (Geman-McClure weights at three times the usual distance)."""
     positions = np.asarray(positions, dtype=float)
     chosen = positions[_spread_frames(np.isfinite(positions[..., 0]).sum(axis=1))]
     places = chosen[_middle_frame(chosen)]
@@ -60,8 +58,7 @@ def distance_spread(positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(median distance, how much it varies, as a standard deviation) of each pair of markers (T, M, 3): (M, M) m each.
 
     From the range that holds nine tenths of the frames, so that short swaps and ghosts count nothing; pairs hardly ever
-    seen together: inf; the diagonal: 0.
-    """
+    seen together: inf; the diagonal: 0."""
     seen = np.isfinite(positions[..., 0])
     chosen = positions[_spread_frames(seen.sum(axis=1))]
     count = chosen.shape[1]

@@ -23,8 +23,7 @@ class Gap(NamedTuple):
     """A stretch of one marker without sight: frames from `first` up to, not with, `end`; `how` it was filled.
 
     how: "cluster" (it rides on markers that move with it), "soft" (on markers that it moves against a little), "spline"
-    (a smooth curve), or "" (not filled).
-    """
+    (a smooth curve), or "" (not filled)."""
 
     marker: int
     first: int
@@ -58,8 +57,7 @@ def fill(positions: np.ndarray, soft: np.ndarray, fps: float, longest: Longest, 
 
     soft: (M, M) m, how much each pair's distance varies. known: the markers whose gaps are filled, and what carries
     them as a rule. ask: called for each gap; it may raise. Every gap is filled from what was seen alone, never from
-    another gap's filling.
-    """
+    another gap's filling."""
     out, told = positions.copy(), []
     shapes: dict[tuple[int, ...], Shape] = {one.helpers: one.shape for one in known.values() if one.helpers}
     for gap in gaps_of(positions, known):

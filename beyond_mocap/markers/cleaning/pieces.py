@@ -48,8 +48,7 @@ class Piece(NamedTuple):
 def leaps(positions: np.ndarray, carried: Mapping[int, Carried], fps: float) -> np.ndarray:
     """(T, M) bool: between which frames markers (T, M, 3) m leap; True at the frame after.
 
-    By how the way in the world bends, and how it does as the marker's helpers see it.
-    """
+    By how the way in the world bends, and how it does as the marker's helpers see it."""
     out = _leaping(positions, max(_LEAP_WORLD, _LEAP_SWING_WORLD / fps**2))
     local = max(_LEAP_LOCAL, _LEAP_SWING_LOCAL / fps**2)
     for marker, one in carried.items():
@@ -78,8 +77,7 @@ def bend(places: np.ndarray) -> np.ndarray:
     """(T, ...) m: how much the step into each frame differs from the two before and the two after, the least of them.
 
     A leap differs from them all; what comes after a leap, or lies between two, does not. places: (T, ..., 3) m; NaN
-    where there is nothing to compare with.
-    """
+    where there is nothing to compare with."""
     steps = np.diff(places, axis=0)
     least = np.full(places.shape[:-1], np.inf)
     for apart in (1, 2):
@@ -231,8 +229,7 @@ def assign(positions: np.ndarray, carried: Mapping[int, Carried], nameless: Sequ
            fps: float) -> tuple[np.ndarray, list[Assigned]]:
     """(positions (T, M, 3) m, what was assigned): pieces of the `nameless` markers moved to the labels they belong to.
 
-    The best fitting first; a label takes at most one at a time, and a piece gives each of its frames once.
-    """
+    The best fitting first; a label takes at most one at a time, and a piece gives each of its frames once."""
     out, found = positions.copy(), []
     alone = np.ascontiguousarray(positions[:, list(nameless)])
     offered = [

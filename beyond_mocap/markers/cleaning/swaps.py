@@ -48,8 +48,7 @@ def exchanged(positions: np.ndarray, pairs: Pairs) -> np.ndarray:
 def there_and_back(positions: np.ndarray, carried: Mapping[int, Carried]) -> tuple[np.ndarray, list[Swap]]:
     """(positions (T, M, 3) m with these swaps exchanged back, the swaps): pairs that leap onto each other's ways twice.
 
-    Between the leaps they are exchanged, unless their clusters say that they are before and after.
-    """
+    Between the leaps they are exchanged, unless their clusters say that they are before and after."""
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     together: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for pair, frames in _moments(_crossings(positions)).items():
@@ -69,8 +68,7 @@ def mend(positions: np.ndarray, carried: Mapping[int, Carried], leaping: np.ndar
     leaping: (T, M) bool from `pieces.leaps`. opposite: pairs that are likely taken for each other (left and right), and
     whole segments of them: always asked about. The exchange that mends the most is made first, and the others are asked
     about again where it matters. ask: called for each question; it may raise. Of a pair that no cluster tells of, a
-    single leap onto each other's ways is told.
-    """
+    single leap onto each other's ways is told."""
     out, found, deformed = positions.copy(), [], _Deformed(carried)
     crossings = _crossings(positions)
     step = max(1, int(_EVERY * fps))
@@ -258,8 +256,7 @@ def _crossing(now, was, markers):
     """The pairs among `markers` whose arrow from one to the other turns round, about the middle between them.
 
     now, was: (N, 3) m, where they are and where they should be by their ways. No segment turns round in one frame, and
-    markers that pass by each other do so on their ways.
-    """
+    markers that pass by each other do so on their ways."""
     arrow, awaited = now[None] - now[:, None], was[None] - was[:, None]
     apart = np.linalg.norm(arrow, axis=-1)
     miss = np.linalg.norm(arrow + awaited, axis=-1)

@@ -37,8 +37,7 @@ def read_c3d(path: str | os.PathLike, unit: float | str | None = None, subject: 
 
     unit: metres per unit or a name; None for the file's own. subject: whose markers, where the file has several bodies.
     up: the file's axis that points up, None to find it.
-    InputError where the file is missing, damaged, cut off or no C3D file, and as `raw_markers.as_trial`.
-    """
+    InputError where the file is missing, damaged, cut off or no C3D file, and as `raw_markers.as_trial`."""
     path = Path(path)
     with opened(path, "a C3D file") as handle:
         size = os.fstat(handle.fileno()).st_size

@@ -19,8 +19,7 @@ def read_markers(path: str | os.PathLike, unit: float | str | None = None, subje
     """The trial in a .c3d or .trc file: metres, Z up.
 
     unit: metres per unit or a name, None for the file's own. subject: whose markers, where several bodies are in the
-    file. up: the file's axis that points up ("Z", "-Y"), None to find it. InputError as `read_c3d` and `read_trc`.
-    """
+    file. up: the file's axis that points up ("Z", "-Y"), None to find it. InputError as `read_c3d` and `read_trc`."""
     reader = _READERS.get(Path(path).suffix.lower())
     if reader is None:
         raise InputError(path, f"ending {Path(path).suffix!r}", " or ".join(ENDINGS), "export it as C3D or TRC")

@@ -36,8 +36,7 @@ class RawMarkers:
     labels: as written. positions: (T, M, 3), NaN where not seen. residuals: (T, M) in the file's unit, NaN where not
     seen; None where unknown. unit: as written, "" where absent. up: (axis, sign) as the file says; None where it does
     not. usual_up: what such files have where they say nothing. prefixes: of labels, as the file names them. listed:
-    labels that the file says are no markers. events: (seconds, label, side, subject). notes: lines for people.
-    """
+    labels that the file says are no markers. events: (seconds, label, side, subject). notes: lines for people."""
 
     labels: list[str]
     positions: np.ndarray
@@ -185,8 +184,7 @@ def find_computed(labels: Sequence[str], listed: Iterable[str] = ()) -> set[str]
 def chosen_subject(path, counts: dict[str, int], wanted: str | None) -> str:
     """Whose markers are meant. counts: {subject: its markers}; wanted: by the user, None for the only body.
 
-    InputError, which lists them, where there are several bodies or not the one wanted.
-    """
+    InputError, which lists them, where there are several bodies or not the one wanted."""
     named = ", ".join(f"{name!r} ({count} markers)" for name, count in counts.items() if name)
     if wanted is not None and wanted.strip():
         if not named:

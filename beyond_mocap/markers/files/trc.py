@@ -35,8 +35,7 @@ def read_trc(path: str | os.PathLike, unit: float | str | None = None, subject: 
 
     unit: metres per unit or a name; None for the file's own. subject: whose markers, where labels have prefixes.
     up: the file's axis that points up, None to find it.
-    InputError, with the line, where the file is missing, damaged or no TRC file, and as `raw_markers.as_trial`.
-    """
+    InputError, with the line, where the file is missing, damaged or no TRC file, and as `raw_markers.as_trial`."""
     path = Path(path)
     lines = _lines(path)
     head = _head(path, lines)

@@ -68,8 +68,7 @@ def decide_unit(path: str | os.PathLike, said: str, positions: np.ndarray, heigh
     height: from feet to head (or pelvis) in it, 0 where unknown.
 
     InputError, which names --unit, where neither header nor size tell, or where the body is impossibly large or small
-    by what the header says.
-    """
+    by what the header says."""
     known = NAMES.get(said.strip().lower())
     span = body_span(positions)
     if known is not None:
@@ -101,8 +100,7 @@ def up_axis(labels: Sequence[str], positions: np.ndarray) -> tuple[int, int] | N
     """(axis 0..2, sign) along which heads (or pelvis) lie above feet; None where the names do not tell or the body
     lies down.
 
-    positions: (T, M, 3), any unit, any axes, NaN where not seen.
-    """
+    positions: (T, M, 3), any unit, any axes, NaN where not seen."""
     up = _upwards(labels, positions)
     if up is None:
         return None
@@ -126,8 +124,7 @@ def handedness(labels: Sequence[str], positions: np.ndarray) -> float:
     """How surely the body is as bodies are: near +1 where ahead, left and up, as the names of markers tell them, form a
     right-handed frame; near -1 where it is mirrored (its coordinates, or its left and right labels); 0 where unknown.
 
-    positions: (T, M, 3), any unit and axes, NaN where not seen.
-    """
+    positions: (T, M, 3), any unit and axes, NaN where not seen."""
     ahead, up, sides = _between(labels, positions, BACK, FRONT), _upwards(labels, positions), _sides(labels)
     if ahead is None or up is None or not sides:
         return 0.0

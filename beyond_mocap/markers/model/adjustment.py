@@ -32,8 +32,7 @@ class Body:
     """What is adjusted, J joints and M markers.
 
     names, parents: of the skeleton. offsets: (J, 3) m. joint: (M,). places: (M, 3) m. held: (J,) bool, joints that do
-    not turn. limb: (J,) axis (0, 1, 2) along which the bone to this joint lies exactly, -1 where it may lie anyhow.
-    """
+    not turn. limb: (J,) axis (0, 1, 2) along which the bone to this joint lies exactly, -1 where it may lie anyhow."""
 
     names: tuple[str, ...]
     parents: tuple[int, ...]
@@ -60,8 +59,7 @@ class Prior:
 class Pull:
     """Turns that are drawn to the rest pose: joint -> (3,) radians of play about its own X, Y, Z (inf: none).
 
-    runs: joints between which no marker stands; they turn alike up to `uneven` radians.
-    """
+    runs: joints between which no marker stands; they turn alike up to `uneven` radians."""
 
     play: dict[int, np.ndarray]
     runs: tuple[tuple[int, ...], ...] = ()

@@ -50,8 +50,7 @@ def model_from_frame(frame: Mapping[str, np.ndarray], marker_set: MarkerSet, sta
     """The model that one frame gives, with predicted joint centres, on which each marker lies where it was seen.
 
     frame: label -> (3,) m, Z up, NaN where not seen. standing: whether it is a static trial's frame. InputError where
-    too few landmarks are marked.
-    """
+    too few landmarks are marked."""
     centres = predict(landmark_places(frame, marker_set), standing)
     carried = {label: marker_set.segment_of(label) for label in frame if np.isfinite(frame[label]).all()}
     names = _joint_names(centres, set(carried.values()))
@@ -114,8 +113,7 @@ def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
 
     clusters: segment (of `template.JOINTS`, others hang on the root) -> labels. Markers of segments with too few for a
     frame of their own are averaged in the frame of the segment they hang on, and markers of no segment by their places.
-    Raises InputError where nobody stands still.
-    """
+    Raises InputError where nobody stands still."""
     first, end = stillest(trial, seconds)
     part = trial.positions[first:end]
     index = {label: i for i, label in enumerate(trial.labels)}
@@ -140,8 +138,7 @@ def static_frame(trial: MarkerTrial, clusters: Mapping[str, Sequence[str]],
 def stillest(trial: MarkerTrial, seconds: float = 2.0) -> tuple[int, int]:
     """The frames, first and the one after the last, of the `seconds` in which the most is seen and moves the least.
 
-    Raises InputError where somebody walks even there.
-    """
+    Raises InputError where somebody walks even there."""
     length = max(1, min(len(trial), int(round(seconds * trial.fps))))
     positions = trial.positions
     step = max(1, int(round(0.1 * trial.fps)))
@@ -198,8 +195,7 @@ def _mean_frame(own, above, mean_above):
 def subject_models(models: Sequence[MarkerModel]) -> tuple[MarkerModel, ...]:
     """The models of one subject's sessions, all with the same skeleton, in their order.
 
-    InputError where they are none, or their joints differ: sessions of another marker set, or another body's.
-    """
+    InputError where they are none, or their joints differ: sessions of another marker set, or another body's."""
     if not models:
         raise InputError("models", "none given", "at least one")
     _check_alike(models)

@@ -49,8 +49,7 @@ def with_late_markers(model: MarkerModel, marker_set: MarkerSet, trial: MarkerTr
                       cancelled: Callable[[], bool] | None = None) -> MarkerModel:
     """The model with the set's markers that it lacks and the trial shows, and joints freed that they now tell.
 
-    Each lies at the median of where it is seen in its segment's frame, over some frames solved without it.
-    """
+    Each lies at the median of where it is seen in its segment's frame, over some frames solved without it."""
     seen = dict(zip(trial.labels, trial.seen.sum(axis=0)))
     late = [label for label in marker_set.labels
             if label not in model.markers and seen.get(label, 0) >= _FEWEST
@@ -90,8 +89,7 @@ def neutral_frames(trial: MarkerTrial, landmarks: dict[str, tuple[int, ...]], co
     """Up to `count` frames in which the body stands most like one in a static trial, best first.
 
     landmarks: name -> indices of its markers. Straight knees, an upright trunk and low feet count; frames lie a fifth
-    of a second apart, and frames in which a landmark is hidden come only where there are no others.
-    """
+    of a second apart, and frames in which a landmark is hidden come only where there are no others."""
     at = {name: trial.positions[:, list(group)].mean(axis=1) for name, group in landmarks.items()}
     cost = np.zeros(len(trial))
     for place in at.values():
@@ -125,8 +123,7 @@ def unlike_frames(trial: MarkerTrial, root: np.ndarray, count: int) -> np.ndarra
     """`count` frames whose poses differ most, ascending: each next one is farthest from those chosen.
 
     root: indices of the pelvis' markers, in whose frame poses are compared. Frames that show less than two thirds of
-    what others show are passed over.
-    """
+    what others show are passed over."""
     frames = np.unique(np.linspace(0, len(trial) - 1, min(len(trial), _CANDIDATES)).astype(int))
     shown = trial.seen[frames].sum(axis=1)
     frames = frames[shown >= 0.67 * shown.max()]
@@ -157,8 +154,7 @@ def calibrate(marker_set: MarkerSet, trial: MarkerTrial, static: MarkerTrial | N
 
     trial: cleaned, labelled as the set labels its markers. static: a static trial of the same body with the same
     markers, or None: the model then begins with upright frames of the motion. InputError where too few landmarks are
-    seen, Cancelled when the user stops.
-    """
+    seen, Cancelled when the user stops."""
     tell = progress or (lambda part, text: None)
     stopped = cancelled or (lambda: False)
     tell(0.0, "joint centres")
@@ -237,8 +233,7 @@ def refined(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None,
 def _chosen(model: MarkerModel, trial: MarkerTrial, static: MarkerTrial | None) -> MarkerTrial:
     """The frames to adjust to, of the model's markers alone: unlike ones of the motion, and some of the static trial.
 
-    They are no neighbours in time, which the rate of one frame a second tells whoever solves them.
-    """
+    They are no neighbours in time, which the rate of one frame a second tells whoever solves them."""
     root = [i for i, label in enumerate(trial.labels) if label in model.markers
             and model.joint[model.markers.index(label)] == 0]
     positions = seen_markers(model, trial)[unlike_frames(trial, np.array(root, dtype=int), FRAMES)]

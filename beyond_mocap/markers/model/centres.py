@@ -38,8 +38,7 @@ class Centres:
 
     places: joint -> centre (3,) m. axes: joint -> (3, 3), columns are the joint's X, Y, Z in the world. sigma: joint ->
     m, how uncertain the centre is. tips: joint -> place (3,) m of its tip. size: how large against the typical body.
-    notes: lines for people.
-    """
+    notes: lines for people."""
 
     size: float
     places: dict[str, np.ndarray] = field(default_factory=dict)
@@ -58,8 +57,7 @@ def predict(points: Mapping[str, np.ndarray], standing: bool = True) -> Centres:
 
     points: landmark -> (3,) m, Z up. standing: whether this is a static trial, so that an upright trunk's axes are the
     vertical and soles lie flat; otherwise they are what the typical body's are. InputError where pelvis or a whole leg
-    cannot be told.
-    """
+    cannot be told."""
     points = {name: np.asarray(place, dtype=float) for name, place in points.items() if np.isfinite(place).all()}
     out = Centres(size=body_size(points))
     _pelvis(out, points)
@@ -93,8 +91,7 @@ def body_size(points: Mapping[str, np.ndarray]) -> float:
 def _fit(joint: str, points: Mapping[str, np.ndarray], size: float, beside: tuple[str, ...] = ()):
     """The typical body's segment laid on its landmarks: rotation (3, 3) and shift, or None where they do not tell.
 
-    beside: landmarks of other segments that are taken in where there are too few of its own.
-    """
+    beside: landmarks of other segments that are taken in where there are too few of its own."""
     names = [name for name, (carrier, _) in LANDMARK_PLACES.items() if carrier == joint and name in points]
     firm = [name for name in names if not name.endswith("scapula")]
     names = firm if len(firm) >= 3 else names
@@ -207,8 +204,7 @@ def _spine(out: Centres) -> None:
 def _hinge(out, points, side, joint, above, hint) -> tuple[np.ndarray, np.ndarray, float] | None:
     """A knee's, ankle's or elbow's centre, the unit direction from its middle to the outside, and the uncertainty.
 
-    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only one side is marked.
-    """
+    above: the centre (3,) of the joint above. hint: (3,) roughly outwards, where only one side is marked."""
     lateral, medial = points.get(f"{side}_{joint}_lateral"), points.get(f"{side}_{joint}_medial")
     if lateral is None and medial is None:
         return None
@@ -337,8 +333,7 @@ def _outwards_plainly(chest, shoulder, elbow, sign) -> np.ndarray:
 def _elbow_and_wrist(out, points, side, sign, shoulder, marker, plain):
     """An elbow as `_elbow` and the wrist's centre, where a lone `marker` lies on the back of the wrist.
 
-    Which side is the back follows from the elbow, and the elbow from the wrist's centre.
-    """
+    Which side is the back follows from the elbow, and the elbow from the wrist's centre."""
     inside = out.size * (LANDMARK_PLACES["left_wrist"][1] - PLACES["LeftHand"])[2]
     outwards = plain
     for _ in range(4):
@@ -364,8 +359,7 @@ def _plane_beside(marker, above, below, half, sign) -> np.ndarray | None:
     """The normal of the plane through `above` and `below` that passes a marker at the distance `half`, towards the
     marker; None where the joint is too straight to have such a plane.
 
-    Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker.
-    """
+    Two planes do; in one of them the joint bends the right way: (upper x lower bone) x sign points to the marker."""
     line = _unit(below - above)
     away = (marker - above) - ((marker - above) @ line) * line
     distance = float(np.linalg.norm(away))

@@ -31,8 +31,7 @@ class MarkerSet:
     landmarks: anatomical point (of `template.LANDMARKS`) -> labels; several mark it by their mean.
     aliases: another label -> the set's own. static: markers that may be missing in all but the static trial.
     optional: markers that may be missing anywhere. ball: markers on a ball. other: markers on things that are no body.
-    about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments.
-    """
+    about: one line for people. InputError for unknown joints or landmarks and markers that lie on two segments."""
 
     name: str
     segments: Mapping[str, tuple[str, ...]]
@@ -116,8 +115,7 @@ def recognise(labels: Sequence[str], sets: Iterable[MarkerSet]) -> MarkerSet:
 
     labels: as recorded; those that nobody has named do not count. Up to a fifth of a set's markers may be missing, as
     those of an arm that was never seen. InputError where every set lacks more: it names the nearest and what is
-    missing.
-    """
+    missing."""
     sets = list(sets)
     named = [label for label in labels if not UNLABELED.match(label)]
     judged = [(marker_set, _present(marker_set, named)) for marker_set in sets]

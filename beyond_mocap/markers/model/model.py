@@ -37,8 +37,7 @@ class Freedom:
 
     order: per joint a permutation of "XYZ": intrinsic turns about the joint's own axes, in that order (as
     `quaternion.from_euler`). free: (J, 3) bool, in that order; an angle that is not free stays zero. low, high: (J, 3)
-    radians, -inf and inf where nothing stops it. The root's row speaks of its rotation; it may be anywhere.
-    """
+    radians, -inf and inf where nothing stops it. The root's row speaks of its rotation; it may be anywhere."""
 
     order: tuple[str, ...]
     free: np.ndarray
@@ -63,8 +62,7 @@ class Freedom:
 class BallMarker:
     """A marker on the surface of a ball that a hand holds.
 
-    label: the marker. joint: index of the hand. centre: (3,) m, the ball's centre in the hand's frame. radius: m.
-    """
+    label: the marker. joint: index of the hand. centre: (3,) m, the ball's centre in the hand's frame. radius: m."""
 
     label: str
     joint: int
@@ -85,8 +83,7 @@ class MarkerModel:
     for spine and neck, whose joints share out evenly what only their ends show (§5.3.1). centre_sigma: (J,) m, how
     uncertain the centre of the joint is. ball: how a ball with a marker lies in the hand, where that is known. subject,
     sessions, set_name: whose model it is, out of which recordings and of which marker set. notes: lines for people on
-    how it was found.
-    """
+    how it was found."""
 
     skeleton: Skeleton
     markers: tuple[str, ...]
@@ -138,8 +135,7 @@ class MarkerModel:
 def freedom_of(joints: Sequence[str], parents: Sequence[int], counts: Mapping[str, int]) -> tuple[Freedom, np.ndarray]:
     """Freedom and stiffness (J,) of these joints.
 
-    counts: joint -> number of markers it carries. A joint with no marker on it nor on anything below it is held.
-    """
+    counts: joint -> number of markers it carries. A joint with no marker on it nor on anything below it is held."""
     below = [counts.get(name, 0) for name in joints]
     for index in range(len(joints) - 1, 0, -1):
         below[parents[index]] += below[index]

@@ -37,8 +37,7 @@ class Chain:
     joint: (M,) which joint carries the marker. places: (M, 3) m in its frame. order: J orders of intrinsic angles,
     permutations of XYZ. free: (J, 3) bool by place in the order; an angle that is not free stays 0. low, high: (J, 3)
     rad, -inf and inf where there is no limit, 0 where not free. stiffness: (J, 3) m per radian, how strongly a
-    joint is drawn to its rest pose: a radian away counts as much as a marker so many metres off.
-    """
+    joint is drawn to its rest pose: a radian away counts as much as a marker so many metres off."""
 
     skeleton: Skeleton
     joint: np.ndarray
@@ -276,8 +275,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def marker_derivative(chain: Chain, at: Poses) -> np.ndarray:
     """How all markers move with the pose: (F, M, 3, 3 + 3 J), by the root's shift and each joint's three turns.
 
-    The whole matrix, for those who want to look at it; the solver never builds it.
-    """
+    The whole matrix, for those who want to look at it; the solver never builds it."""
     placed = place(chain, at)
     about = axes(chain, at, placed)
     count, frames = len(chain.skeleton), at.root.shape[-1]

@@ -48,8 +48,7 @@ class Task:
     seen: (M, 3, F) m, any numbers where the weight (M, F) is 0. drawn: (J, 3) m per radian, how strongly a joint is
     drawn to its rest pose (in place of the chain's stiffness). lean: poses to be drawn to besides, or None; leaning:
     (J, F) m per radian, how strongly. point: a held point, or None.
-    even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike.
-    """
+    even: m per radian, how strongly the joints of a run (`Chain.runs`) are held to turn alike."""
 
     chain: Chain
     seen: np.ndarray
@@ -182,8 +181,7 @@ def _uneven(task: Task, at: Poses) -> np.ndarray:
     """Of every joint of a run how far its rotation vector is from the run's mean, and the derivative of half its square
     by the joint's turns: (joints, 2, 3, F) rad.
 
-    The mean's own derivative adds nothing, since the distances from it cancel out.
-    """
+    The mean's own derivative adds nothing, since the distances from it cancel out."""
     out = []
     for run in task.chain.runs:
         vectors = logarithm(at.local[list(run)])
@@ -259,8 +257,7 @@ def _solved(task: Task, best: State, stops: dict, damping: np.ndarray, curved: n
 def wishes(task: Task, best: State) -> elimination.Own:
     """What the pull to the rest pose, and that to even runs, asks of each joint's turns.
 
-    The derivative of half the squared length of a rotation vector by a small turn is the vector itself.
-    """
+    The derivative of half the squared length of a rotation vector by a small turn is the vector itself."""
     strength = task.drawn**2
     curvature = np.zeros((len(strength), 3, 3, best.cost.shape[-1]))
     pull = strength[..., None] * best.bend

@@ -128,8 +128,7 @@ def step(chain: Chain, placed: Placed, axes: np.ndarray, asked: Bodies, own: Own
     """The damped step: the root's shift (3, F) m and all joints' turns (J, 3, F) rad about their axes (J, 3, 3, F).
 
     damping: (F,) >= 0, added to the curvature of every turn (and of the root's shift). bent: second derivatives to go
-    with; None: without. `asked` is used up.
-    """
+    with; None: without. `asked` is used up."""
     parents = chain.skeleton.parents
     passed, rest = {}, {}
     for joint in range(len(parents) - 1, 0, -1):

@@ -82,8 +82,7 @@ def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarr
     first step led over a limit end on it; which joints are held: (J, F) bool.
 
     slope: (J, 3, F), the derivative of half the cost by each joint's turns. ahead: the angles (J, 3, F) to which that
-    first step led, or None.
-    """
+    first step led, or None."""
     low, high = chain.low[..., None], chain.high[..., None]
     stops = np.zeros(at.angles.shape, dtype=bool)
     bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)

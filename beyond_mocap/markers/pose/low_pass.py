@@ -99,8 +99,7 @@ def kalman(motion: Motion, worth: np.ndarray | None = None, cutoff: float = CUTO
     for 1. cutoff: hertz at which half the power is let through where all frames are worth 1, by which the jerk's share
     of the noise is set, so that it stands beside `butterworth` at the same figure.
     A motion that is too short or too slow comes back unchanged with a note. Raises InputError for a worth of another
-    shape or below 0, for a cutoff that is no positive number, and for a motion that holds numbers that are none.
-    """
+    shape or below 0, for a cutoff that is no positive number, and for a motion that holds numbers that are none."""
     check_numbers(motion, cutoff)
     worth = _checked(worth, motion)
     note = unfit(motion, cutoff)

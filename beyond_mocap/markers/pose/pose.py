@@ -55,8 +55,7 @@ def between(chain: Chain, solved: Poses, known: np.ndarray, told: np.ndarray,
     joints any do: (J,) bool.
 
     solved: poses of all T frames, of which `known` (K,) count. told: (K, J) bool. Before the first and after the last
-    telling frame a joint stays as it is there.
-    """
+    telling frame a joint stays as it is there."""
     places, (before, after, part) = solved.root[:, known].T, _around(known, frames)
     root = places[before] + part[:, None] * (places[after] - places[before])
     local = np.empty((len(frames), len(chain.skeleton), 4))
@@ -81,8 +80,7 @@ class HeldBall:
     """A ball in the hand: its centre stands still in the hand, and a seen marker lies on its surface.
 
     joint: the hand's name. centre: (3,) m in its frame. radius: m. seen: (T, 3) m, the marker, NaN where not seen.
-    held: (T,) bool. weight: what it counts beside a body's marker.
-    """
+    held: (T,) bool. weight: what it counts beside a body's marker."""
 
     joint: str
     centre: np.ndarray
@@ -110,8 +108,7 @@ class Solved:
     motion: the skeleton moving. residual: (T, M) m between the model's marker and the seen one, NaN where not seen.
     weights: (T, M). single: (T, M) m, the same when each segment is laid through its own markers alone, NaN where it
     has fewer than three. iterations: (T,) steps taken, 0 where a frame was not solved. at_limit: (T, J) bool. seconds:
-    the time it took. notes: lines for people.
-    """
+    the time it took. notes: lines for people."""
 
     motion: Motion
     residual: np.ndarray
@@ -127,8 +124,7 @@ def solve(model, trial, settings: PoseSettings = PoseSettings(), progress=None, 
     """The model's motion through a trial's markers.
 
     model: a `MarkerModel`; trial: a `MarkerTrial` with its labels. progress(fraction, text) and cancelled() as
-    everywhere. InputError where the trial has hardly any of the model's markers.
-    """
+    everywhere. InputError where the trial has hardly any of the model's markers."""
     began = time.perf_counter()
     seen = _positions(model, trial)
     solving = _Solving(_chain(model, settings.limits), seen, settings, fps=trial.fps, usual=model.edge_sigma,

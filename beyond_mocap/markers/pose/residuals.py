@@ -58,8 +58,7 @@ def edge_deviation(joint: np.ndarray, places: np.ndarray, seen: np.ndarray) -> n
     shorter than in the model, as a part of their length.
 
     joint: (M,) the cluster of each marker. places: (M, 3) m in the model. seen: (T, M, 3) m, NaN where not seen. NaN
-    where a marker is not seen or has fewer than two edges: the deviation of one edge cannot be laid to either end.
-    """
+    where a marker is not seen or has fewer than two edges: the deviation of one edge cannot be laid to either end."""
     out = np.full(seen.shape[:2], np.nan)
     for cluster in np.unique(joint):
         own = np.flatnonzero(joint == cluster)
@@ -86,8 +85,7 @@ def cluster_deviation(joint: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
     deviation: (T, M) of `edge_deviation`. The sum runs over the cluster's markers and is divided by the frames, as
     printed: with n markers a cluster, a marker begins to count less when it deviates sqrt(n) times as much as the
-    cluster's markers do in the mean. NaN where nothing is known.
-    """
+    cluster's markers do in the mean. NaN where nothing is known."""
     square = deviation**2
     known = np.isfinite(square)
     mean = np.where(known, square, 0.0).sum(axis=0) / np.maximum(known.sum(axis=0), 1)
@@ -104,8 +102,7 @@ def marker_weights(joint: np.ndarray, places: np.ndarray, seen: np.ndarray,
 
     Eq. 5.2 is printed the other way round (sigma_i / sigma_s), which would count a marker the more the further it is
     off. A marker whose sigma is unknown counts 1. usual: (M,) sigma_s of each marker's cluster where it is known from
-    elsewhere (NaN where not); None: from these frames.
-    """
+    elsewhere (NaN where not); None: from these frames."""
     deviation = edge_deviation(joint, places, seen)
     own = cluster_deviation(joint, deviation)
     if usual is not None:

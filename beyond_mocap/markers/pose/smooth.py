@@ -26,8 +26,7 @@ def smooth(task: Task, start: Poses, seconds: float, fps: float, watch=lambda pa
     """Smooth poses near `start`, and which joints limits hold: (J, T) bool.
 
     seconds: how strongly: an acceleration counts as much as a marker that is off by what the acceleration covers in
-    half of the square of that time. watch: called with the part done before each window.
-    """
+    half of the square of that time. watch: called with the part done before each window."""
     at, total = start.copy(), start.root.shape[-1]
     held = np.zeros((len(task.chain.skeleton), total), dtype=bool)
     strength = (seconds * fps) ** 2

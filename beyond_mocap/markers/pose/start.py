@@ -19,8 +19,7 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
     """Poses of frames by themselves.
 
     seen: (M, 3, F) m, anything where the weight (M, F) is 0. guess: local rotations to lean on where markers leave a
-    joint open; None: the rest pose.
-    """
+    joint open; None: the rest pose."""
     skeleton, frames = chain.skeleton, weights.shape[-1]
     rest, distance = _rest(chain)
     local = np.zeros((len(skeleton), 4, frames))
@@ -79,8 +78,7 @@ def _about(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, before: np.nda
 def _best(profile: np.ndarray) -> np.ndarray:
     """The rotations (4, F) with the largest sum of products with these matrices (3, 3, F).
 
-    Davenport's method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot come out mirrored.
-    """
+    Davenport's method: the dominant eigenvector of a symmetric 4x4 matrix, which cannot come out mirrored."""
     b = np.moveaxis(profile, -1, 0)
     k = np.empty((len(b), 4, 4))
     trace = np.trace(b, axis1=1, axis2=2)

@@ -38,8 +38,7 @@ class Held:
     """What the hand says, T frames.
 
     marker: (T, 3) m, where the ball's marker would be, were it held on and on. centre: (T, 3) m of the ball and
-    velocity: (T, 3) m/s, likewise. sigma: m, how sure the marker's place is.
-    """
+    velocity: (T, 3) m/s, likewise. sigma: m, how sure the marker's place is."""
 
     marker: np.ndarray
     centre: np.ndarray
@@ -54,8 +53,7 @@ class LaunchFit:
     time: s from frame 0. position: (3,) m of its centre then. velocity: (3,) m/s. spin: (3,) rad/s, zero where not
     told. offset: (3,) m, from centre to marker at the release. circle: m, of the circle on which the marker goes round:
     no ball is smaller. residual: m, root mean square of the marker in flight. time_sigma: s and speed_sigma: m/s, one
-    standard deviation each. frames: of flight that were seen. seconds: of flight that were used.
-    """
+    standard deviation each. frames: of flight that were seen. seconds: of flight that were used."""
 
     time: float
     position: np.ndarray
@@ -75,8 +73,7 @@ def fit_launch(marker: np.ndarray, held: Held, fps: float, guess: float, ball: B
     """The launch that explains the ball's marker (T, 3) m, NaN where it is not seen.
 
     guess: s, the first guess; release times up to `window` s before and after it are tried. ball: what acts on it in
-    the air. None where the marker is not seen away from the hand in at least two frames.
-    """
+    the air. None where the marker is not seen away from the hand in at least two frames."""
     search = _Search(marker, held, fps, ball, radius)
     first, last = max(guess - window, search.times[1]), min(guess + window, search.times[-2])
     tried = np.arange(np.ceil(first * fps), np.floor(last * fps) + 1) / fps
@@ -197,8 +194,7 @@ class _Search:
         """Spin (3,) rad/s, offset (3,) m of the marker from the centre, and the centre (3,) m, at the release.
 
         The circle's own plane gives the axis; what the marker has along it has two signs, of which the one is taken
-        that puts the centre nearer to where the hand has it.
-        """
+        that puts the centre nearer to where the hand has it."""
         a, b = flight.circle
         there, usual, radius = flight.place + a, _at(self.held.centre, self.fps, t0), self.radius
         axis = np.cross(a, b)

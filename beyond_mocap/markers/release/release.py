@@ -74,8 +74,7 @@ class Release:
     residual: m of its marker in flight, NaN without. flight_frames: in which it was seen to fly. radar: m/s that the
     file's name tells, or None. centre: (3,) m in the hand's frame, radius: m. path: the ball in all frames. impact:
     (3,) m, where it first meets the ground, or None. hips: (3,) m in the first frame. notes: lines for people. All
-    places are in the motion's space, over its own floor; markers may be shifted from it.
-    """
+    places are in the motion's space, over its own floor; markers may be shifted from it."""
 
     time: float
     frame: int
@@ -125,8 +124,7 @@ def release(trial: MarkerTrial, motion: Motion, settings: ReleaseSettings = Rele
     """When and how the ball left the hand.
 
     motion: solved from the trial, frame for frame, or at another rate over the same time. InputError: a motion of
-    another length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known.
-    """
+    another length, a skeleton without hands, a ball's marker that is not there, a kind of ball that is not known."""
     ball = THROWN.get(settings.ball)
     if ball is None:
         raise InputError("release", f"ball {settings.ball!r}", f"one of {', '.join(THROWN)}")
@@ -357,8 +355,7 @@ def radar_speed(name: str) -> float | None:
     """m/s out of a file's name without its ending, or None where it tells no speed for certain.
 
     `000000_000000_74_195_002_FF_808` is a pitch of 80.8 mph; `throw_130kmh`, `throw-36.1mps`, `ff_81mph` say it with a
-    unit. Two different speeds in one name are none.
-    """
+    unit. Two different speeds in one name are none."""
     pitch = _PITCH.match(name)
     if pitch:
         return _possible_speed(int(pitch[1]) / 10.0 * MPH)

@@ -49,8 +49,7 @@ def sharpened(hand: Hand, trial: MarkerTrial, never: tuple[str, ...] = ()) -> Ha
     """The hand as its own markers have it, in every frame in which they tell.
 
     trial: as many frames, at even times. never: labels that are no part of the hand (the ball's). A constant shift of
-    the motion against the markers, as setting feet on the floor makes, is found and taken off.
-    """
+    the motion against the markers, as setting feet on the floor makes, is found and taken off."""
     lift = _lift(hand, trial, never)
     names, seen = _near(replace(hand, origin=hand.origin + lift, elbow=hand.elbow + lift), trial, never)
     if not names:
@@ -138,8 +137,7 @@ def ball_in_hand(points: np.ndarray, radius: float, usual: np.ndarray, fit_radiu
 
     points: of one throw or, better, of several, in each of which the marker was elsewhere on the ball. A single place
     leaves the centre anywhere on a sphere about it: then `usual` (3,) m, where balls usually lie, chooses. radius: m,
-    or what is expected. fit_radius: find it too, where the places are far enough apart to tell it.
-    """
+    or what is expected. fit_radius: find it too, where the places are far enough apart to tell it."""
     points = np.asarray(points, float).reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=-1)]
     if not len(points):
@@ -181,8 +179,7 @@ def place_ball(hand: Hand, centre: np.ndarray, launch: Launch, ball: Ball, groun
     """(T, 3) m: the ball's centre in every frame of the hand.
 
     centre: (3,) m, where the ball lies in the hand's frame. launch: how it leaves, s from frame 0. Shortly before, the
-    ball goes over to the place of the launch on a spline in the hand's frame, without a jump in place or speed.
-    """
+    ball goes over to the place of the launch on a spline in the hand's frame, without a jump in place or speed."""
     times = hand.times
     held = hand.carried(centre)
     leaves = _held_at(held, hand.fps, launch.time)
@@ -227,8 +224,7 @@ def fastest(places: np.ndarray, fps: float) -> int:
 def by_distance(hand: np.ndarray, marker: np.ndarray, fps: float) -> int | None:
     """The frame from which on the ball's marker (T, 3) m is 10 % further from the hand (T, 3) m than while held.
 
-    None where it never is, or is not seen often enough to tell.
-    """
+    None where it never is, or is not seen often enough to tell."""
     away = np.linalg.norm(marker - hand, axis=-1)
     seen = np.flatnonzero(np.isfinite(away))
     if len(seen) < 2 * _STAYS:

@@ -62,8 +62,7 @@ class HandRelease:
 def release_by_hand(hand: Hand, radius: float, stride: np.ndarray | None = None) -> HandRelease:
     """The release of a ball of `radius` m that nobody sees.
 
-    stride: (T, 2) m, level, from one foot to the other, as the body stands in its step; None where nobody knows.
-    """
+    stride: (T, 2) m, level, from one foot to the other, as the body stands in its step; None where nobody knows."""
     course = _Course(hand)
     times, tips, grip = course.times, course.velocity(PAD), course.velocity(HOLD)
     turning = _length(course.turn)

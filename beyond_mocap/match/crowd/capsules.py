@@ -123,8 +123,7 @@ class Touching:
 def touching(one: np.ndarray, other: np.ndarray, radii: tuple[np.ndarray, ...], least: float = 0.0) -> Touching:
     """Where two bodies' capsules are at least `least` metres deep in each other.
 
-    one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m.
-    """
+    one (T, C, 2, 3) and other (T, D, 2, 3): ends of their lines, m; radii: (C,) and (D,) m."""
     off = one[:, 0].sum(axis=1) - other[:, 0].sum(axis=1)
     near = np.flatnonzero(np.einsum("tk,tk->t", off, off) < (2.0 * FAR) ** 2)
     frame, a, b = np.nonzero(_balls_meet(one[near], other[near], radii[0][:, None] + radii[1] - least))

@@ -106,8 +106,7 @@ def knot_step(fps: float) -> int:
 def applied(motion: Motion, correction: Correction, first: int = 0) -> Motion:
     """The motion, whose frame 0 is frame `first` of the match's clock, as corrected: bones as long as they were, feet
     flat where they were flat, and every bit as it was where nothing is corrected. Each frame is corrected by itself.
-    InputError where rates differ.
-    """
+    InputError where rates differ."""
     if abs(motion.fps - correction.fps) > 1e-9:
         raise InputError("correction", f"{correction.fps:g} frames per second", f"{motion.fps:g}, the motion's rate")
     return carried(motion, correction.curves(first, len(motion)))
@@ -138,8 +137,7 @@ def joined(parts: Sequence[tuple[Correction, int, int]], reach: int) -> Correcti
     """The corrections of neighbouring windows as one.
 
     parts: (correction, first, end) with the frames of each window's core, in order; each was worked out `reach` frames
-    beyond both ends. Around an edge between two cores the one goes over into the other within 2 `reach` frames.
-    """
+    beyond both ends. Around an edge between two cores the one goes over into the other within 2 `reach` frames."""
     fps, step = parts[0][0].fps, parts[0][0].step
     total: dict[int, np.ndarray] = {}
     for number, (correction, first, end) in enumerate(parts):
@@ -161,8 +159,7 @@ def leg_moved(
     """Local rotations (W, 4) by joint with which the ankle lies `shift` (W, 3) m from where the pose has it against the
     hip; the foot keeps its rotation in the world.
 
-    places (W, J, 3) m and world (W, J, 4): of all joints in the pose that is given.
-    """
+    places (W, J, 3) m and world (W, J, 4): of all joints in the pose that is given."""
     hip, knee, ankle = (places[:, joint] for joint in (limb.upper_leg, limb.lower_leg, limb.foot))
     thigh, shin, line = knee - hip, ankle - knee, ankle - hip
     lengths, goal = (np.linalg.norm(thigh, axis=1), np.linalg.norm(shin, axis=1)), line + shift

@@ -42,8 +42,7 @@ def kept_apart(
     motions: on the pitch, frames at `fps` per second; firsts: the frame of the match's clock at which each begins.
     contacts: (T, 2) bool each, left and right foot that stand. firm: (T,) each, how firmly it keeps its way against
     others (`match.crowd.spacing.keeping` around touches of the ball), 1 by default. Where a correction would reach
-    beyond a motion's ends it is cut off there: give some seconds more than what is used (`correction.joined`).
-    """
+    beyond a motion's ends it is cut off there: give some seconds more than what is used (`correction.joined`)."""
     bodies, start = _on_one_clock(motions, contacts, firsts, firm)
     curves = [np.zeros((len(body.lines), CURVES)) for body in bodies]
     done = [Correction.none(fps)] * len(bodies)

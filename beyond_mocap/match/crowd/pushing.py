@@ -60,8 +60,7 @@ def pushed(
 
     curves: those that they have already. pressures: of each pair, what its contacts have pressed with so far; changed.
     held: for each body whether its curves stay what they are at its first and at its last frame. The bodies lie on the
-    same T frames, from frame `first` of the clock of the pressures on.
-    """
+    same T frames, from frame `first` of the clock of the pressures on."""
     now = [np.array(values) for values in curves]
     calm = [Calm.of(body, own, ends, fps) for body, own, ends in zip(bodies, now, held)]
     for turn in range(_ROUNDS):

@@ -45,8 +45,7 @@ def spaced(
 
     times (N,) s, rising evenly; positions (P, N, 2) m, NaN where somebody is not there; keep (P, N): how firmly each
     keeps his way against the others', 1 by default (`keeping`). Shifts are 0 but around meetings, and at the first and
-    last frame.
-    """
+    last frame."""
     shifts = np.zeros(positions.shape)
     if len(times) < 4:
         return shifts

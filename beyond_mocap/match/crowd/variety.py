@@ -27,8 +27,7 @@ def lags(positions: np.ndarray) -> np.ndarray:
 
     positions (P, N, 2) m at evenly spaced times, NaN where somebody is not there; a sample or a few a second will do.
     There are PERIOD / APART lags. Whoever is near others most chooses first, and each takes the lag which, with those
-    beside it, those have near whom he is least; then they choose again.
-    """
+    beside it, those have near whom he is least; then they choose again."""
     count = round(PERIOD / APART)
     near = np.zeros((len(positions), len(positions)))
     for one, place in enumerate(positions):
@@ -47,8 +46,7 @@ def in_step(shown: np.ndarray, seconds: np.ndarray, positions: np.ndarray) -> np
     """(P, T) bool: who shows at which time the same clip as somebody within NEAR metres, within PHASE seconds of it.
 
     shown (P, T) int: which clip, a mirrored one being another, -1 where somebody is not there; seconds (P, T) of its
-    own clock; positions (P, T, 2) m, of P players at T common times.
-    """
+    own clock; positions (P, T, 2) m, of P players at T common times."""
     found = np.zeros(shown.shape, bool)
     for one in range(len(shown) - 1):
         others = slice(one + 1, None)

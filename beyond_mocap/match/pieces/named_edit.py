@@ -48,8 +48,7 @@ class NamedEdit:
     clips: table of clips. clip (R,) index into it; first (R,) frame of the clip, at the library's rate from its
     beginning, that a run begins with (beyond the clip's ends a little, where these are held); rate (R,) frames that it
     goes on by; length (R,) frames; cut (R,) bool: whether it begins another piece or goes on with the run before. keys:
-    in the order of time.
-    """
+    in the order of time."""
 
     clips: tuple[ClipName, ...]
     clip: np.ndarray

@@ -90,8 +90,7 @@ def run(
     tasks: taken one by one, only as far as workers are free for them. work: a function of a module, which other
     processes can import by its name. spent: is told of each piece what it took. Raises
     Cancelled soon after `cancelled()` says so, InputError where the cluster does not answer, has no workers, or goes
-    away. Closing the iterator, or an error, ends what is still being done.
-    """
+    away. Closing the iterator, or an error, ends what is still being done."""
     stop = cancelled or (lambda: False)
     if place.scheduler:
         with _cluster(place.scheduler) as client:
@@ -145,8 +144,7 @@ def _spread(tasks: Iterator[Task], work: Work, place, stop) -> Generator[tuple[o
     """The loop over one place's workers: keeps them busy, hands on what is done, and does again what was lost.
 
     After a break all that was in hand is done again; after several the pieces go one by one, so that the one that ends
-    its worker is found.
-    """
+    its worker is found."""
     again: deque[Task] = deque()
     going: dict[Future, Task] = {}
     breaks = 0

@@ -45,8 +45,7 @@ class Unit:
     player: his id. stretch: which of his stretches on the pitch. number: of the window within the stretch. start, end:
     s on the match's clock of the part that is its own. plan: his order of that and of the overlaps around it, as
     `kept`. first: frame of the plan's first time, at the library's rate from the stretch's first time on. own: (first,
-    end) frames of its own part, counted in the same way.
-    """
+    end) frames of its own part, counted in the same way."""
 
     player: str
     number: int
@@ -63,8 +62,7 @@ def units_of(plan: Plan, stretch: int = 0, window: float = WINDOW, overlap: floa
 
     window: seconds; their edges are at multiples of it on the match's clock, to the nearest slot. overlap: seconds that
     two neighbours share. Key moments are moved to the touches they mean before the plan is cut. InputError
-    for a window or an overlap that leaves no sense.
-    """
+    for a window or an overlap that leaves no sense."""
     if not 5.0 <= window <= 3600.0:
         raise InputError("--window", f"{window:g} s", "5 to 3600 s")
     if not 1.0 <= overlap <= window / 2.0:
@@ -103,8 +101,7 @@ def cut_plan(plan: Plan, start: float, end: float) -> Plan:
     """The plan from `start` to `end` seconds, both within its track.
 
     The track's first sample is at `start` and its last at `end`; where the feed has none then, it lies on the line
-    between its neighbours. Key moments and pins outside are left out; spans are kept whole where they reach into it.
-    """
+    between its neighbours. Key moments and pins outside are left out; spans are kept whole where they reach into it."""
     inside = [key for key in plan.timeline.keys if start <= key.in_force <= end]
     spans = [span for span in plan.timeline.spans if span.start < end and span.end > start]
     return replace(

@@ -63,8 +63,7 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
     """The edit list of one window of a player.
 
     library: the recordings; where the plan allows made clips, all windows are offered them, so that neighbours choose
-    from the same. Raises what `synthesize` raises. The same library, unit and numpy give the same bits.
-    """
+    from the same. Raises what `synthesize` raises. The same library, unit and numpy give the same bits."""
     from threadpoolctl import threadpool_limits
 
     begun = time.process_time()
@@ -124,8 +123,7 @@ def spliced(
     """A player out of all of his windows, and how these were joined.
 
     library: in which they were searched. plans: one per stretch, from which `units_of` made its windows; pieces: all of
-    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing.
-    """
+    theirs, in any order; window: s of the windows in which he will be laid out. InputError where a piece is missing."""
     stretches, joints = [], []
     for number, plan in enumerate(plans):
         plan = kept(plan)

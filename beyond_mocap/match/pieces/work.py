@@ -53,8 +53,7 @@ def library_of(source: LibrarySource) -> Library:
     """The library, from memory where this process has read it before; it holds one at a time.
 
     InputError where what is found there is not the library that the work was ordered with: recordings have been
-    changed, or this machine computes with another numpy, so that results would differ.
-    """
+    changed, or this machine computes with another numpy, so that results would differ."""
     with _lock:  # several threads of one worker ask at once
         if source not in _held:
             built = build(source.folder, cache_dir=source.cache, skeleton=source.skeleton, unit=source.unit,
@@ -134,8 +133,7 @@ def player_report(
     """The figures of a player with one take, one measured track and the overlap (T,) m with others' bodies for each
     stretch in which he is there; in the form of the contract's Report JSON, with `time_lost_s` and `per_second` beside.
 
-    ball: the match's, as written out. InputError where a take has another skeleton than the library.
-    """
+    ball: the match's, as written out. InputError where a take has another skeleton than the library."""
     reports = [evaluate(take, track, library) for take, track in zip(takes, tracks)]
     out = combined(reports, [len(take.motion) for take in takes])
     out["time_lost_s"] = time_lost(out["warning_seconds"])

@@ -67,8 +67,7 @@ def page(folder: Path, thumbnail: Thumbnail | None = None) -> str:
     """The page, as text, of what 'beyond-mocap match' wrote into `folder`; players that failed or are not yet done are
     marked. thumbnail: draws a player in a second, for the worst of them; without it they have no picture.
 
-    InputError where match.json is missing or cannot be read.
-    """
+    InputError where match.json is missing or cannot be read."""
     match = read_match_results(Path(folder))
     anchors = {player.id: f"player-{number}" for number, player in enumerate(match.players, 1)}
     worst, span = worst_seconds(match.players), _span(match)

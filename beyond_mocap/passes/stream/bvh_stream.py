@@ -49,8 +49,7 @@ class BvhStream:
 
     hierarchy: the text of a BVH file's HIERARCHY section that is known beforehand, or None. rows: how values become
     poses, as soon as a hierarchy and a frame are there. frame_time: seconds, as the stream says, else None. rubbish:
-    pieces that were left out; others: frames of other avatars. told: what was wrong with the last rubbish, one line.
-    """
+    pieces that were left out; others: frames of other avatars. told: what was wrong with the last rubbish, one line."""
 
     def __init__(self, hierarchy: str | None = None, unit: float | None = None):
         self.unit = unit

@@ -163,8 +163,7 @@ def spine_bent(body: Body, surface: Surface, at: int, shift: np.ndarray, weight:
     `at`.
 
     weight (W,): share of the bend at each frame. Every joint of the spine (and neck, for the head) turns alike, by one
-    damped step of the inverse of how the middle moves; the bend goes along with the hips, and is at most MOST_BEND.
-    """
+    damped step of the inverse of how the middle moves; the bend goes along with the hips, and is at most MOST_BEND."""
     skeleton, joint = body.skeleton, surface.start[0]
     hips = identify(skeleton).hips
     bending = [j for j in joints_down(skeleton, hips, joint)[1:] if j != joint or surface.part == "head"]

@@ -62,8 +62,7 @@ class Construction:
     old: the motion that stays at both ends, None for none.
     faces_ball: whether the body turns so that what strikes points at the ball.
     planned: whether the track is a planned path: it is kept exactly, the heading is given in all frames, and the body
-        does not lean more than its source does.
-    """
+        does not lean more than its source does."""
 
     library: Library
     plan: ResolvedPlan
@@ -177,8 +176,7 @@ def solve_heading(track: SampledTrack, source: Footage, given: np.ndarray | None
     """(T,) rad, unwrapped: the compromise between the track's direction and the source's own turning.
 
     track: T frames; a body that stands or goes slowly turns to what it looks at there. source: T frames without jumps.
-    given: (T,) rad that the heading has to be, NaN where it is free.
-    """
+    given: (T,) rad that the heading has to be, NaN where it is free."""
     firm = turning_firmness(source.standing, source.height, track.fps)
     aim = track.direction + wanted_offset(track)
     return facing(track.direction, track.speed, source.velocity, source.turn, given, firm=firm, aim=aim)

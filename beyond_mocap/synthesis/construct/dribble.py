@@ -41,8 +41,7 @@ def dribble(
     frame of each, fractional. held: the frames, first and last, in which the ball is met at key moments. measured (T,)
     bool: False where a sample counts for nothing. turns: frames at which the ball is known to change its course outside
     of the stretches. Frames before and behind the stretches change only where the ball has to come to its first touch
-    or go from its last.
-    """
+    or go from its last."""
     path, pushes = np.array(ball, dtype=float), []
     measured = np.isfinite(path).all(axis=1) if measured is None else np.asarray(measured, bool)
     for low, high in stretches:

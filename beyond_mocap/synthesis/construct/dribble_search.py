@@ -72,8 +72,7 @@ class Legs:
 
     feet: their striking surfaces, left and right; lines: both ends (W, 3) m of each. pelvis (W, 2) m; velocity (W, 2)
     m/s and speed (W,) of it without the sway of steps; ahead (W, 2): unit, where it goes, or faces where it hardly
-    goes.
-    """
+    goes."""
 
     def __init__(self, skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float):
         places, world = pose_kinematics(skeleton, root, rotations)
@@ -297,8 +296,7 @@ class Search:
         """For each of `ends` (N, 3) m the cost of the cheapest roll there, its source, and its velocity (N, 2) m/s.
 
         What a roll costs beside its way is worked out for all; the way, which only adds to it, for the cheapest, a few
-        at a time, until no other can be cheaper.
-        """
+        at a time, until no other can be cheaper."""
         starts = np.where((sources == _START)[:, None], self.feed[0], self.place[sources])
         frames = frame - np.where(sources == _START, 0, self.frame[sources])
         speeds = speeds_of(starts[:, None], ends, frames[:, None] / self.fps)

@@ -34,8 +34,7 @@ def following(
 
     look (3,): which way the head joint looks, in its own frame (`pins.look_axis`). share (T,): how much of the turn is
     made at each frame; chest (T,): how much of it the chest takes. The motion itself where nothing is to be seen
-    throughout.
-    """
+    throughout."""
     known = np.isfinite(places).all(axis=1)
     if not known.any():
         return motion

@@ -41,8 +41,7 @@ class OldMotion:
     rotation: (W, 4) of the root joint.
     stepped: (W, 2) bool, extra steps of either foot.
     share: (W,) of the old motion in what comes out, 0 where it is replaced.
-    stretch: first and end frame of the window between which it is free.
-    """
+    stretch: first and end frame of the window between which it is free."""
 
     root: np.ndarray
     rotation: np.ndarray
@@ -114,8 +113,7 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
     """Root (T, 3) m and local rotations (T, J, 4) that are `new` where share (T,) is 0 and `old` where it is 1.
 
     new, old: root and rotations of T frames; what `old` has where share is 0 counts for nothing. standing (T, 2, 2)
-    bool: heels and toes, left and right, that stand.
-    """
+    bool: heels and toes, left and right, that stand."""
     root = new[0] + share[:, None] * (old[0] - new[0])
     rotations = quaternion.slerp(_signed_like(new[1], old[1], share), old[1], share[:, None])
     body = Body.posed(skeleton, root, rotations)

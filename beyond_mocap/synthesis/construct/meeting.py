@@ -60,8 +60,7 @@ def best_aim(
 
     line: ends (3,) m of the part's line, radius its own, m; direction (3,) level, unit: where the part strikes; rise:
     sine of the ball's elevation as seen from the part; ball (3,) m as measured; avoid: (line, radius) that it may not
-    lie in; possible: of a move (3,) m of the part, what the body can make of it.
-    """
+    lie in; possible: of a move (3,) m of the part, what the body can make of it."""
     shares = _ALONG[: 1 if rise else None]
     aims = [Aim(turned_about_up(direction, angle), along) for angle in _ANGLES for along in shares]
     found = meetings(line, radius, aims, rise=rise, ball=ball, room=room, avoid=avoid)
@@ -150,8 +149,7 @@ def shifted(
 ) -> np.ndarray:
     """The ball's path (T, 3) m led through `places` (2, 3) m at the two frames `held`, and eased back to where it was.
 
-    bounds: frames at which it has to be back, beside BALL_SECONDS. Never below its radius.
-    """
+    bounds: frames at which it has to be back, beside BALL_SECONDS. Never below its radius."""
     reach = BALL_SECONDS * fps
     low, high = max(held[0] - reach, bounds[0]), min(held[1] + reach, bounds[1])
     frames = np.arange(max(int(np.ceil(low)), 0), min(int(high), len(ball) - 1) + 1)

@@ -69,8 +69,7 @@ def facing(
     with a little of `aim`. Every term is quadratic, so the whole is one tridiagonal system. kept: (T,) radians that the
     facing has to be, NaN where it is free: what lies around a stretch that is constructed again. firm (T,): how many
     times firmer than usual the recording's own turning is followed (`turning_firmness`). aim: (T,) radians that a body
-    which stands slowly turns to.
-    """
+    which stands slowly turns to."""
     goal = direction - arctan2(velocity[:, 1], velocity[:, 0])
     trust = _moving(speed) ** 2 * _moving(np.linalg.norm(velocity, axis=1)) ** 2
     goal, trust = _with_aim(goal, trust, speed, aim, turn)
@@ -155,8 +154,7 @@ def turn_to_ball(
     """(T,) radians to turn the body by, about its root, at most MOST_TURN_TO_BALL at any touch.
 
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out; ball (T, 3) m, NaN where there is none. Of two
-    parts that may strike, the faster one's place counts.
-    """
+    parts that may strike, the faster one's place counts."""
     turn, at = np.zeros(len(root)), np.arange(len(root))
     for touch in touches:
         offset = _turn_at_touch(skeleton, root, rotations, ball, touch)
@@ -194,8 +192,7 @@ def missing_lean(
 
     speed (T,) m/s and direction (T,) in radians of travel on the track; velocity (T, 2) m/s of the recording in its
     facing frame and turn (T,) radians since the frame before; seams (S,): frames across which a recording's direction
-    says nothing; slow: as UPRIGHT_SPEED.
-    """
+    says nothing; slow: as UPRIGHT_SPEED."""
     own_speed = np.linalg.norm(velocity, axis=1)
     own_turn = turn + np.diff(arctan2(velocity[:, 1], velocity[:, 0]), prepend=arctan2(*velocity[:1, ::-1].T))
     own_turn[seams] = own_turn[np.minimum(seams + 1, len(turn) - 1)]
@@ -217,8 +214,7 @@ def bend_forward(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarra
 def lean_into_curves(skeleton: Skeleton, rotations: np.ndarray, direction: np.ndarray, lean: np.ndarray) -> np.ndarray:
     """Local rotations (T, J, 4) of a body that leans to the left of its direction of travel (T,) by lean (T,) as a / g.
 
-    The body turns about its root, legs and all, and the trunk turns back a part of the way above the hips.
-    """
+    The body turns about its root, legs and all, and the trunk turns back a part of the way above the hips."""
     out, axis = rotations.copy(), np.column_stack([np.cos(direction), np.sin(direction), np.zeros(len(direction))])
     out[:, 0] = quaternion.multiply(quaternion.about_axis(axis, -LEGS_LEAN * lean), rotations[:, 0])
     _turn_trunk(skeleton, rotations, axis, (LEGS_LEAN - TRUNK_LEAN) * lean, out)
@@ -243,8 +239,7 @@ def absorb_foot_slide(
     root (T, 3) m and rotations (T, J, 4) local: the motion laid out; standing (T, 2, 2) bool: heels and toes. With f a
     point that stands, a its arm from the root and J a quarter turn, minimizes sum _FOOT_WEIGHT w |r' + t' J a + f'|^2
     + _STIFF |r''', t'''|^2 + _STAY |r, t|^2, differences per frame at 30 frames per second: one banded system. The legs
-    make up for the rest (`foot_plant`); what drifts away from the track is taken back by `pulled_to_track`.
-    """
+    make up for the rest (`foot_plant`); what drifts away from the track is taken back by `pulled_to_track`."""
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, root, rotations)
     count, scale = len(root), 30.0 / fps

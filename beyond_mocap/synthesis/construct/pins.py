@@ -81,8 +81,7 @@ def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, l
     """A motion whose frame 0 is at second `start`, with its hands, feet and gaze at their pins.
 
     pins: anything with time and hold s, part and position m (`plan.Pin`), no two of a part at one time. contacts (T, 2)
-    bool. look (3,): which way the head joint looks, in its own frame (`look_axis`).
-    """
+    bool. look (3,): which way the head joint looks, in its own frame (`look_axis`)."""
     out, targets = _Work(motion, np.array(contacts), look), {}
     for part in dict.fromkeys(pin.part for pin in pins):
         targets[part] = target([pin for pin in pins if pin.part == part], start, motion.fps, len(motion))

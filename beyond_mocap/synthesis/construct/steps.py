@@ -80,8 +80,7 @@ def steps(
     """The extra steps of a motion laid out on the ground.
 
     root (T, 3) m and rotations (T, J, 4) local; standing (T, 2, 2) bool of heels and toes, left and right. given (T,
-    2) bool: steps that are taken already, `free` (T,) bool: where others may be added (everywhere).
-    """
+    2) bool: steps that are taken already, `free` (T,) bool: where others may be added (everywhere)."""
     none = Steps.none(rotations, standing)
     if len(root) < 2:
         return none
@@ -114,8 +113,7 @@ class _Foot:
 
     points (T, 2) m of ankle and toe, middle (T,) m between them, yaw (T,) its direction, radians, unwrapped; stands
     and flat (T,) bool: on the ground, with heel and toe; before, behind (T,) frames and through (T,): where `held`
-    (T,) bool, between which of its places the foot is, and how far.
-    """
+    (T,) bool, between which of its places the foot is, and how far."""
 
     def __init__(self, limb: Limb, places, world, root, heading, standing: np.ndarray):
         self.limb, self.places, self.world = limb, places[:, limb.foot], world[:, limb.foot]

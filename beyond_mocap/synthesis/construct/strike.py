@@ -90,8 +90,7 @@ def strike(
     centre, NaN where there is none. measured (T,) bool: False where the feed filled the ball in; None: measured
     everywhere. height_known (T,) bool: where the ball's height is measured, None: everywhere; elsewhere the ball lies
     on the ground but for high touches, to which it rises and from which it falls freely. Frames outside the touches'
-    windows come back bit for bit.
-    """
+    windows come back bit for bit."""
     count = len(root)
     measured, height_known = (np.ones(count, bool) if flags is None else np.asarray(flags, bool)
                               for flags in (measured, height_known))

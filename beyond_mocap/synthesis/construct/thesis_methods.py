@@ -28,8 +28,7 @@ UPRIGHT = np.cos(np.radians(50.0))  # height of the trunk's unit vector below wh
 def lay_out_blocks(construction: Construction, travelled: np.ndarray | None) -> tuple[Planted, Steps]:
     """Lay T source frames on the ground as the thesis does: nothing is planted.
 
-    travelled: (T,) m by method "distance", None by "blocks".
-    """
+    travelled: (T,) m by method "distance", None by "blocks"."""
     track, source = construction.track, construction.source
     smooth = _spread_transitions(construction.plan, source)
     if travelled is None:

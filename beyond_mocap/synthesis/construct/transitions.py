@@ -23,8 +23,7 @@ def fade_share(through: np.ndarray, after: np.ndarray) -> np.ndarray:
     """(R,) share that the other piece has in each frame of a fade.
 
     through (R,) from 0 to 1: how far the fade has come; after (R,) bool: whether the frame lies behind the seam, where
-    the other piece is the one that ends.
-    """
+    the other piece is the one that ends."""
     begun = quintic_step(through)
     return np.where(after, 1.0 - begun, begun)
 
@@ -42,8 +41,7 @@ def faded_rotations(
     """Rotations (T, J, 4) mixed at frames `at` (R,) with those of the other piece (R, J, 4) by their `fade_share`.
 
     A joint turns the same way round throughout a fade: two swinging arms may be half a turn apart, and the shorter arc
-    of each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade.
-    """
+    of each frame alone would change sides in the middle. Taken is the side that is shorter in the mean of the fade."""
     out = np.array(rotations, dtype=float)
     ends = np.where(after[:, None, None], other, out[at])
     begins = np.where(after[:, None, None], out[at], other)

@@ -42,8 +42,7 @@ def give_way(
 
     track: the player's samples as measured; timeline: what was asked, for the key moments; library: what it was made
     from, without made clips; ik_miss (T, 2) m: how far each leg was short of where its foot should stand; asked: the
-    user's own words, where `timeline` has automatic ones beside them. What is not known is not reported.
-    """
+    user's own words, where `timeline` has automatic ones beside them. What is not known is not reported."""
     stride = played.stride(library)
     source = played.clip, played.mirrored, played.clip_frame, stride
     keys = moments(played, timeline.keys, stride, library) if timeline is not None else []

@@ -25,8 +25,7 @@ class Moment:
     clip_frame (the clip's key frame, in its own rate), None where no key of a clip is played there. played_at: seconds
     on the track's clock at which that key frame is played, NaN where it is not. words: those that the source carries at
     `frame`. entry, exit: first and last output frame, without a seam between, that the clip's annotated row covers.
-    used_instead: words in place of the asked ones, None where the asked ones were had.
-    """
+    used_instead: words in place of the asked ones, None where the asked ones were had."""
 
     asked: KeyMoment
     frame: int
@@ -101,8 +100,7 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
     """Seconds at which a run plays `key_frame`: clip_frames (R,) ascending, times (R,) s.
 
     Up to one output frame before or after the run the rate is taken to go on; NaN farther out, where it is never
-    played.
-    """
+    played."""
     if len(times) < 2 or not np.all(np.diff(clip_frames) > 0):
         hit = np.flatnonzero(np.abs(clip_frames - key_frame) < 0.5)
         return float(times[hit[0]]) if len(hit) else np.nan
@@ -118,8 +116,7 @@ def ball_gap(played: Played, moment: Moment) -> float:
     """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
     nearest to the asked time (`striking.contact_gap`, overlap counted as distance too); NaN without ball or part.
 
-    The part is that of the words which are played there; of the asked ones where those touch no ball.
-    """
+    The part is that of the words which are played there; of the asked ones where those touch no ball."""
     if played.ball is None:
         return np.nan
     pose = played.positions[moment.frame], played.rotations[moment.frame]

@@ -40,8 +40,7 @@ _DIRECTIONS = np.stack([np.cos(_DIRECTIONS), np.sin(_DIRECTIONS)])
 def track_at(track: Track, at: np.ndarray) -> np.ndarray:
     """The measured track (T, 2) m at the seconds `at` (T,): straight lines between samples, held beyond the ends.
 
-    Not smoothed. Samples that cleaning filled in or replaced as outliers are left out. NaN where none is measured.
-    """
+    Not smoothed. Samples that cleaning filled in or replaced as outliers are left out. NaN where none is measured."""
     known = track.measured
     if not known.any():
         return np.full((len(at), 2), np.nan)
@@ -51,8 +50,7 @@ def track_at(track: Track, at: np.ndarray) -> np.ndarray:
 def root_error(pelvis: np.ndarray, track: np.ndarray, fps: float) -> np.ndarray:
     """Distance (T,) m between pelvis (T, 2) and track (T, 2), both through the same zero-phase Hann window of 1.5 s.
 
-    The window is linear, so one pass over the difference is the difference of two passes.
-    """
+    The window is linear, so one pass over the difference is the difference of two passes."""
     return np.linalg.norm(zero_phase_hann(pelvis - track, fps, ROOT_WINDOW), axis=-1)
 
 
@@ -80,8 +78,7 @@ def surge(pelvis: np.ndarray, fps: float) -> np.ndarray:
     """Pelvis speed along its path minus that speed's 1.5 s Hann: (T, 2) m -> (T,) m/s.
 
     The path's direction is that of the velocity behind the same window. Its rms guards against buying still feet with a
-    surging pelvis.
-    """
+    surging pelvis."""
     speed = time_derivative(pelvis, fps)
     course = unit_vectors(zero_phase_hann(speed, fps, ROOT_WINDOW))
     along = np.sum(speed * course, axis=-1, keepdims=True)
@@ -107,8 +104,7 @@ def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.
     """Shares of frames that ask for a speed the library cannot play within the warp limits.
 
     wanted (T,) m/s; fastest root and slowest gait of the library, m/s. above: wanted > fastest x 1.15; below: wanted <
-    slowest x 0.85 and more than standing (0.5 m/s). NaN where the library's speed is not known.
-    """
+    slowest x 0.85 and more than standing (0.5 m/s). NaN where the library's speed is not known."""
     above = np.mean(wanted > fastest * reach[1]) if np.isfinite(fastest) else np.nan
     below = np.mean((wanted < slowest * reach[0]) & (wanted > STANDING)) if np.isfinite(slowest) else np.nan
     return {"above": float(above), "below": float(below)}
@@ -130,8 +126,7 @@ def windowed(values: np.ndarray) -> np.ndarray:
 def uncut_windows(values: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Windowed maxima of an uncut clip where the whole window lies inside it, and the speed in their middle.
 
-    values (T-3,) m/s^3 of `jerk`, speed (T,) m/s -> (M,), (M,) with M = T - 19, or none in a short clip.
-    """
+    values (T-3,) m/s^3 of `jerk`, speed (T,) m/s -> (M,), (M,) with M = T - 19, or none in a short clip."""
     if len(values) < _WIDTH:
         return np.zeros(0), np.zeros(0)
     whole = slice(JERK_REACH, len(values) - JERK_REACH)
@@ -142,8 +137,7 @@ def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndar
     """95th percentile (5,) m/s^3 of uncut windows (M,) in each speed class of speed (M,) m/s.
 
     A class with fewer than `least` windows takes the nearest class that has them (runs above 4.5 m/s are rare); NaN
-    where none has.
-    """
+    where none has."""
     classes = speed_class(speed)
     values = [windows[classes == k] for k in range(5)]
     return nearest_known(np.array([np.percentile(v, 95) if len(v) >= least else np.nan for v in values]))
@@ -152,8 +146,7 @@ def real_p95(windows: np.ndarray, speed: np.ndarray, least: int = 30) -> np.ndar
 def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Windowed jerk at each seam over the real p95 at that speed: (S,).
 
-    values (T-3,) m/s^3; seams (S,) frames; speed (T,) m/s; real (5,) m/s^3 of `real_p95`.
-    """
+    values (T-3,) m/s^3; seams (S,) frames; speed (T,) m/s; real (5,) m/s^3 of `real_p95`."""
     if not len(values) or not len(seams):
         return np.zeros(0)
     middle = np.clip(seams - SEAM_TO_JERK, 0, len(values) - 1)
@@ -203,8 +196,7 @@ def stances(contacts: np.ndarray) -> np.ndarray:
 def stance_travel(toes: np.ndarray, spans: np.ndarray) -> np.ndarray:
     """Largest horizontal distance between two places of the planted toe within each stance: (S,) m.
 
-    toes (T, 2, 3) m; spans (S, 3) of `stances`.
-    """
+    toes (T, 2, 3) m; spans (S, 3) of `stances`."""
     travel = np.zeros(len(spans))
     along = np.concatenate([toes[..., :2] @ _DIRECTIONS, np.zeros((1, 2, _DIRECTIONS.shape[1]))])
     for side in (0, 1):
@@ -220,8 +212,7 @@ def skating_steps(toes: np.ndarray, floor: float, fps: float) -> np.ndarray:
     """GMD's skating frames: (T-1,) bool, either foot.
 
     toes (T, 2, 3) m. Toe lower than 5 cm above the floor at t and t+1, faster than 0.5 m/s, and its 0.25 s mean speed
-    too (Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio`; their code works at 20 fps).
-    """
+    too (Karunratanakul et al. 2023, Guided Motion Diffusion, `calculate_skating_ratio`; their code works at 20 fps)."""
     speed = np.linalg.norm(np.diff(toes[..., :2], axis=0), axis=-1) * fps
     width = 2 * int(GMD_SECONDS * fps / 2) + 1
     mean = uniform_filter1d(speed, width, axis=0, mode="constant") if len(speed) else speed
@@ -233,8 +224,7 @@ def support_height(feet: np.ndarray, contacts: np.ndarray, heel_rest: float) -> 
     """Height above the ground of each planted foot's lower part: (T, 2) m, NaN where there is no contact.
 
     feet (T, 2, 2, 3) m; `heel_rest`: height of the heel joint while the sole is flat, m. A foot on its heel counts by
-    the heel, a foot on its toes by the toe, so neither rolling raises the figure.
-    """
+    the heel, a foot on its toes by the toe, so neither rolling raises the figure."""
     lower = np.minimum(feet[..., 1, 2], feet[..., 0, 2] - heel_rest)
     return np.where(contacts, lower, np.nan)
 
@@ -244,8 +234,7 @@ def tip_height(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray)
     one.
 
     positions (T, J, 3) m and rotations (T, J, 4) of the joints, world. Where a skeleton has no toe joints the floor is
-    known from the ankles alone, and only the tips show a boot that is in the ground.
-    """
+    known from the ankles alone, and only the tips show a boot that is in the ground."""
     body, lowest = identify(skeleton), np.full(len(positions), np.nan)
     for parent, offset in zip(skeleton.end_parents, skeleton.end_offsets):
         if parent in (body.left.toe_or_foot, body.right.toe_or_foot) and np.any(offset):
@@ -258,8 +247,7 @@ def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
     """Height of the heel joint on a flat foot, m: 2nd percentile over feet (T, 2, 2, 3) while both are in contact (T,
     2).
 
-    Over all frames where they never are, as in a run; NaN for no frames.
-    """
+    Over all frames where they never are, as in a run; NaN for no frames."""
     both = contacts.all(axis=1)
     heights = feet[both if both.any() else slice(None), :, 0, 2]
     return float(np.percentile(heights, 2)) if heights.size else np.nan
@@ -268,6 +256,5 @@ def heel_rest_height(feet: np.ndarray, contacts: np.ndarray) -> float:
 def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) -> np.ndarray:
     """How far planted feet stand from where the laid-out clip had them: feet, wanted (T, 2, 2, 3) m -> (N,) m.
 
-    Heel and toe joints' mean distance, one value per planted foot and frame.
-    """
+    Heel and toe joints' mean distance, one value per planted foot and frame."""
     return np.linalg.norm(feet - wanted, axis=-1).mean(axis=-1)[contacts]

@@ -36,8 +36,7 @@ class Played:
     the library; clip (T,) int index into it, -1 where the source is not known; clip_frame (T,) fractional frame in that
     clip's own rate, NaN where not known; mirrored (T,) bool. words: T word tuples of the source frames, sides after
     mirroring, or None. contacts (T, 2) bool, left and right. ball: as written out, or None. correction (T, 2) m each
-    foot was moved by polish, or None. keys: how key moments were served, empty where only files tell.
-    """
+    foot was moved by polish, or None. keys: how key moments were served, empty where only files tell."""
 
     motion: Motion
     start_time: float
@@ -114,8 +113,7 @@ def played_from_tables(
     provenance: `synthesis.provenance.Provenance`, or anything with its arrays: times (T,) s, clip (T paths),
     clip_frame (T,), mirrored (T,) bool, words (T tuples), contacts (T, 2) bool. Without it the motion starts at
     `start_time` and contacts are detected on the motion itself. where: the table's file, for messages. InputError where
-    it has another length.
-    """
+    it has another length."""
     count = len(motion)
     if provenance is None:
         unknown, nowhere, plain = np.full(count, -1), np.full(count, np.nan), np.zeros(count, bool)
@@ -136,8 +134,7 @@ def find_transitions(clip: np.ndarray, mirrored: np.ndarray, clip_frame: np.ndar
     """Output frames (S,) that start a new piece: the clip (or its mirroring) changes, or clip_frame jumps.
 
     A jump is a step of more than 1.5 frames times the warp there, in frames of the output's rate, or of less than half
-    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side.
-    """
+    of it (a step back, a repeated stretch). The warp is the median rate of up to four steps on either side."""
     rate = played_rate(clip, mirrored, clip_frame, stride)
     known = (clip[1:] >= 0) | (clip[:-1] >= 0)
     warp = np.maximum(_neighbours_median(rate), 0.25)
@@ -173,8 +170,7 @@ def find_replayed(
 
     A frame replays where an earlier run of the same clip (same side) showed a frame within 80 source frames at 60 fps
     (1.33 s of the clip) of it in the last 4 s. A run that starts beyond everything the earlier run showed only skipped
-    ahead, and does not count.
-    """
+    ahead, and does not count."""
     number = number_pieces(len(clip), find_transitions(clip, mirrored, clip_frame, stride))
     first, last = np.full(number[-1] + 1, np.inf), np.full(number[-1] + 1, -np.inf)
     np.fmin.at(first, number, clip_frame)

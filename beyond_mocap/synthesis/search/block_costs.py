@@ -79,8 +79,7 @@ def windows(frames: Frames, clip: np.ndarray, centre: np.ndarray, size: int) -> 
     A window that would leave its clip is moved inwards (Faustino fig. 7b); a clip shorter than the window repeats its
     last frame. Eq. 17 compares the window around a block's last frame with the one around the next block's first, which
     are one frame apart even in an uncut clip; callers centre the first one frame later, as eq. 16 does, so that going
-    on costs nothing.
-    """
+    on costs nothing."""
     first, last = frames.first[clip], frames.first[clip] + frames.count[clip] - 1
     start = np.clip(centre - size // 2, first, np.maximum(last - size + 1, first))
     index = np.minimum(start[:, None] + np.arange(size), last[:, None])

@@ -49,8 +49,7 @@ def cheapest_path(
     of each choice of slot s + 1 after each of slot s. Returns the choices (S,) and the total cost. Ties go to the
     first.
 
-        cheapest_path([np.array([0, 1.0]), np.array([5.0, 0])], lambda s: np.zeros((2, 2)))   # -> [0, 1], 0.0
-    """
+        cheapest_path([np.array([0, 1.0]), np.array([5.0, 0])], lambda s: np.zeros((2, 2)))   # -> [0, 1], 0.0"""
     total = np.asarray(unary[0], dtype=float)
     back: list[np.ndarray] = []
     for slot in range(1, len(unary)):

@@ -54,8 +54,7 @@ class Ways:
         """The cheapest way to each frame: numbers of the frames (k,), costs (k,), states by which one comes (k,).
 
         Of frames that begin no piece those are left out that cannot be among the `most` cheapest of them and of `known`
-        (L,) costs of other ways to fill the slot.
-        """
+        (L,) costs of other ways to fill the slot."""
         most_above = np.partition(known, most - 1)[most - 1] - self.base if len(known) >= most else np.inf
         near = np.flatnonzero((to.piece >= 0) | (to.cost <= most_above))
         to = to.only(near)

@@ -36,8 +36,7 @@ def catch_up(error: float, frames: int, window: int) -> np.ndarray:
     by the logistic of eq. 27, 28.
 
     Eq. 27 runs from 1 % to 99 % of the error; it is stretched here to run from 0 to all of it, so that the next section
-    does not inherit a rest.
-    """
+    does not inherit a rest."""
     window = max(1, min(window, frames))
     at = np.minimum(np.arange(frames), window)
     logistic = 1.0 / (1.0 + np.exp(-STEEPNESS / (window / 2.0) * (at - window / 2.0)))
@@ -50,8 +49,7 @@ def warp(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.ndarr
 
     source: (M,) metres travelled at each source frame, target: (F,) at each output frame, both from 0 and not
     decreasing. Both are taken as shares of their totals, so that the whole stretch is played. `idle` metres are added
-    per frame on both sides: where nobody moves, time itself passes.
-    """
+    per frame on both sides: where nobody moves, time itself passes."""
     m, f = len(source), len(target)
     if m < 2 or f < 2:
         return np.zeros(f)
@@ -64,8 +62,7 @@ def warp(source: np.ndarray, target: np.ndarray, idle: float = 1e-3) -> np.ndarr
 def edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple[PlacedKey, ...], fixed) -> EditList:
     """An edit list from per-frame clips (T,) and library frames (T,), its seams moved to the best of +-3 frames.
 
-    fixed: output frames (key moments) across which no seam may move.
-    """
+    fixed: output frames (key moments) across which no seam may move."""
     clip, frame = clip.copy(), frame.astype(float).copy()
     seams = find_seams(clip, frame)
     fixed = sorted(fixed)
@@ -126,8 +123,7 @@ def warped_edit(search: BlockSearch, sections: list[Section], catching_up: bool)
     """The sections played so that locomotion goes at the track's speed, and (T,) metres travelled by each output frame.
 
     Other sections are played as recorded and travel what the recording did; what they lose or gain against the track is
-    regained in the locomotion that follows (`catching_up`), or stays.
-    """
+    regained in the locomotion that follows (`catching_up`), or stays."""
     clip, frame = frames_of(_joined(sections))
     source = edit_list(search.library, clip, frame, (), _fixed(search, sections))
     piece = np.zeros(len(source), int)

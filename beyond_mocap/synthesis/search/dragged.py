@@ -41,8 +41,7 @@ def undragged(
     """The slots (first, end) that a key's clip is to fill, and with them those that are left without the slots at
     either end, one by one, that drag its feet; `around` frames on either side of `at` stay.
 
-    edges (S + 1,) output frames of all slots.
-    """
+    edges (S + 1,) output frames of all slots."""
     first, end = slots
     a, b = first, end
     while at - edges[a + 1] >= around and drags(

@@ -48,8 +48,7 @@ def replaced(
 ) -> EditList:
     """The edit list with frames first .. end of clip (T,) and frame (T,) in their place, and `keys` beside its own.
 
-    Seams outside stay as they are; those inside and at both ends of the stretch are found anew.
-    """
+    Seams outside stay as they are; those inside and at both ends of the stretch are found anew."""
     inside = slice(first, end)
     new_clip, new_frame = edit.clip.copy(), edit.frame.copy()
     new_clip[inside], new_frame[inside] = clip[inside], frame[inside]

@@ -41,8 +41,7 @@ class Footage(Shown):
     pose (T, J, 4) local rotations, the root's relative to its facing; height (T,) m of the root; sway (T, 2) m from the
     clip's path to the root, in the facing frame; velocity (T, 2) m/s of the path as played, in the facing frame; turn
     (T,) radians of facing since the frame before, 0 at a seam; standing (T, 2, 2) bool of heels and toes. ahead_*: the
-    same for the frame that the piece before would have shown at each seam, (S, ...).
-    """
+    same for the frame that the piece before would have shown at each seam, (S, ...)."""
 
     pose: np.ndarray
     height: np.ndarray
@@ -93,8 +92,7 @@ class Overlap:
 
     at (R,) output frame, no frame twice; through (R,) how far the window around the seam has come there, between 0 and
     1; after (R,) bool: behind the seam, where the other piece is the one that ends. pose (R, J, 4), height (R,) m, sway
-    (R, 2) m of the other piece.
-    """
+    (R, 2) m of the other piece."""
 
     at: np.ndarray
     through: np.ndarray
@@ -107,8 +105,7 @@ class Overlap:
 def overlap(library: Library, footage: Footage, reach: float) -> Overlap:
     """At most `reach` frames on either side of each seam, and half of the shorter neighbouring piece.
 
-    A clip that ends sooner shortens its side, but for a frame or two in which its end is held.
-    """
+    A clip that ends sooner shortens its side, but for a frame or two in which its end is held."""
     edges = np.concatenate([[0], footage.seams, [len(footage.clip)]])
     none = np.zeros(0)
     rows = [_around(library, footage, edges[n : n + 3], reach) for n in range(len(footage.seams))]

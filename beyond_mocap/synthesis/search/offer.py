@@ -45,8 +45,7 @@ class Offer:
     """N library frames at R rates. speed (R, N) m/s, turn (R, N) radians and valid (R, N) of a slot that begins there;
     by_speed (K,) the valid pairs (rate, frame), flat, in the order of their speeds; offset, long_stance (N,): see
     `Pairs`; made (N,) bool; wild_before, wild_after (N,): see `wildness`; bucket (N,) int: frames of one bucket look
-    alike to whoever sees them twice.
-    """
+    alike to whoever sees them twice."""
 
     _kept: weakref.WeakKeyDictionary[Library, dict[bytes, "Offer"]] = weakref.WeakKeyDictionary()
 

@@ -39,8 +39,7 @@ def cheapest(
     (k,).
 
     speeds (K,) m/s of the pairs, ascending; weight: what a metre per second of missed speed costs each pair at least;
-    cost_of: (n,) costs of a part of the pairs.
-    """
+    cost_of: (n,) costs of a part of the pairs."""
     near = _nearest(speeds, speed, looked_at)
     part, cost = _promising(cost_of, speeds, speed, weight=weight, near=near, count=count)
     best = np.sort(np.argpartition(cost, count)[:count]) if len(cost) > count else np.arange(len(cost))
@@ -99,8 +98,7 @@ class Weights:
     worth more; rate per unit of warp; stretch per unit of warp beyond 0.85 to 1.15; switch for any cut; pose per metre
     of joint distance; feet per metre that a foot which stands before and after a cut would jump; wild for cutting where
     the clips jerk by as much again as is usual; rate_change per unit; replay for a stretch shown less than 4 s ago;
-    held per frame beyond a clip's end.
-    """
+    held per frame beyond a clip's end."""
 
     speed: float = 1.0
     drag: float = 1.0
@@ -361,8 +359,7 @@ def balanced(alpha: float, weights: Weights = Weights()) -> Weights:
     (1 - alpha) / 0.8, so that alpha = 0.2, the paper's and the default, leaves them as they are.
 
     Speed, turn and facing keep their weights: they hold the body on its track, which is nothing to be traded. So do
-    actions that nobody asked for, and replayed stretches.
-    """
+    actions that nobody asked for, and replayed stretches."""
     words, continuity = alpha / Plan.alpha, (1.0 - alpha) / (1.0 - Plan.alpha)
     return replace(
         weights, words=weights.words * words, **{name: getattr(weights, name) * continuity for name in _CONTINUITY}

@@ -79,8 +79,7 @@ class PathSearch:
     measure of how far poses are apart. on_grid: slots lie as in other searches of the same frames (`slot_edges`).
     hurry: when it says so the rest is searched by a narrow beam, and `hurried` is the frame from which on, else None;
     before the first slot is filled it ends the search as `cancelled` does. narrow: the beam is narrow from the second
-    slot on.
-    """
+    slot on."""
 
     def __init__(
         self,

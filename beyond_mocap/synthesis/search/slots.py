@@ -55,8 +55,7 @@ def slot_edges(
 
     There is an edge half way between key moments that crowd each other, and one before and after each where the
     shortest of its clips begins and ends, so that a clip which does not fit its surroundings need not be played longer
-    than it must; none of these leaves a slot shorter than SHORTEST beside it.
-    """
+    than it must; none of these leaves a slot shorter than SHORTEST beside it."""
     end = len(wanted) if end is None else end
     served = [key for key in wanted.keys if key.choices and first <= round(key.frame) < end]
     at = [key.frame for key in served]

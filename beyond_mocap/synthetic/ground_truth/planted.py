@@ -306,8 +306,7 @@ def sample_feed(
 
     noise: m, standard deviation of each of the ball's coordinates, half of it from sample to sample. filled: share of
     samples that lie on straight lines between the touches instead. snaps: share of touches at which the ball is put to
-    the player for a fifth of a second.
-    """
+    the player for a fifth of a second."""
     rng = np.random.default_rng(seed)
     times = np.arange(int(match.seconds * fps)) / fps
     ball = match.ball_at(times) - np.array([0.0, 0.0, match.ball.radius])

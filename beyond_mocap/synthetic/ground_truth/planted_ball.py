@@ -28,8 +28,7 @@ class PlantedBall:
 
     release: seconds at which the ball leaves the hand. side: "Left" or "Right". radius: metres. turns: revolutions a
     second in flight. seen: seconds of flight after which no camera sees it. drag: 1/m, see `ball.physics`. label: the
-    marker's. grip: (3,) metres, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
-    """
+    marker's. grip: (3,) metres, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it."""
 
     release: float
     side: str = "Right"
@@ -46,8 +45,7 @@ class BallTruth:
     """What came out: places (T, 3) metres of the ball's centre and marker (T, 3) of the marker, without noise.
 
     position, velocity: (3,) m and m/s of the centre at release. spin: (3,) radians a second in flight. grip: (3,)
-    metres in the hand's axes. asked: the ball that was planted.
-    """
+    metres in the hand's axes. asked: the ball that was planted."""
 
     asked: PlantedBall
     places: np.ndarray

@@ -31,8 +31,7 @@ _TIPS = {"Head": (0.01, 0.0, 0.19), "Hand": (0.0, 0.18, 0.0), "ToeBase": (0.07, 
 def in_marker_axes(motion: Motion) -> Motion:
     """`motion` on a skeleton in the axes of marker models, joints named as there; InputError where no legs are found.
 
-    Root positions metres, world, Z up; joints that mean nothing (fingers, a rig's helpers) are left out.
-    """
+    Root positions metres, world, Z up; joints that mean nothing (fingers, a rig's helpers) are left out."""
     body = identify_posed(motion)
     anatomy = study(motion.skeleton, body, motion)
     places, world = forward_kinematics(motion)
@@ -137,8 +136,7 @@ def adult_share(skeleton: Skeleton) -> float:
 def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) -> Motion:
     """Somebody who stands still for a static trial: arms lifted 45 degrees, elbows bent a little, swaying a little.
 
-    skeleton: one of `in_marker_axes`. The feet stand at z = 0, the body faces +X.
-    """
+    skeleton: one of `in_marker_axes`. The feet stand at z = 0, the body faces +X."""
     rng = np.random.default_rng(seed)
     count = max(int(round(seconds * fps)), 2)
     times = np.arange(count) / fps

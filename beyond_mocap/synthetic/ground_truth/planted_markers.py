@@ -55,8 +55,7 @@ class Planted:
     named and turned as in marker models (`planted_body`). centres: (T, J, 3) metres, its joints. pose: the true motion
     of the static trial. markers: where they lie on the bones. clean: (T, M, 3) metres, where the trial's markers truly
     were, skin and noise in them but no faults. faults: what was done to the trial. ball: where one was asked for, the
-    ball in the hand and in flight; its marker stands last among the trial's named ones.
-    """
+    ball in the hand and in flight; its marker stands last among the trial's named ones."""
 
     trial: MarkerTrial
     static: MarkerTrial
@@ -89,8 +88,7 @@ def planted(
     marker_set: one of `planted_places.SETS`, or labels. noise: metres of the cameras' scatter in each coordinate (sd).
     softness: factor on what skin does (1: 10 to 15 mm on a moving thigh, 0: markers on bone). occlusion: share of the
     samples that are hidden. swaps, jumps, unlabeled: how many of each. ball: one in a hand, thrown. InputError for an
-    unknown set, or a body without legs.
-    """
+    unknown set, or a body without legs."""
     truth = in_marker_axes(motion)
     labels = _labels(marker_set)
     markers = placed(truth.skeleton, labels, seed)

@@ -38,8 +38,7 @@ class Place:
     on: the joint that carries it. to, share: begins at this share of the bone to the joint `to` ("shoulders": to the
     middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres
     by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind
-    shocks, from 0 (bone) to 1 (a thigh's flesh).
-    """
+    shocks, from 0 (bone) to 1 (a thigh's flesh)."""
 
     on: str
     to: str | None
@@ -240,8 +239,7 @@ def markers_on(motion: Motion, placed: Placed) -> np.ndarray:
 def on_skin(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int, softness: float = 1.0) -> np.ndarray:
     """Markers (T, M, 3) metres, world, that the skin carries over the bones.
 
-    neutral: (J, 4) local rotations in which no skin is shifted. softness: factor on all shifts; 0 is bone.
-    """
+    neutral: (J, 4) local rotations in which no skin is shifted. softness: factor on all shifts; 0 is bone."""
     rigid = markers_on(motion, placed)
     if softness <= 0.0:
         return rigid

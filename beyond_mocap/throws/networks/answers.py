@@ -27,8 +27,7 @@ def answered(
     """`after` with what the network's answer y (..., out) says; places and turns of its chain are right from then on.
 
     The single network's places are left out here and its turns taken, so that bones keep their length: `floating` has
-    them.
-    """
+    them."""
     if name == SINGLE:
         return _single_pose(chains, settings, y, pose, xp)
     if name == "hip":
@@ -57,8 +56,7 @@ def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
 
     Of hip both upper legs, of body both upper arms and the head (his two, and the head, whose motion was lost in
     his), of a limb its wrist or toe, each in the chain's reference frame; of the single network its four effectors.
-    Joints that ride along are taken as at rest.
-    """
+    Joints that ride along are taken as at rest."""
     if name == SINGLE:
         count = len(chains.joints)
         places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3)

@@ -32,8 +32,7 @@ class Chains:
     hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all
     joints whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the
     first joints of both arms and legs, middles: elbows and knees, ankles: feet. chest, neck, head: the next below where
-    there is none.
-    """
+    there is none."""
 
     skeleton: Skeleton
     hips: int

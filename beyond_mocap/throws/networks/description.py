@@ -27,8 +27,7 @@ class Description:
     hand joints in the world, or None. limb: which of `chains.EFFECTORS` throws or kicks. release: fractional frame at
     which the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after
     (A, 4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to
-    keep still.
-    """
+    keep still."""
 
     effectors: np.ndarray
     hands: np.ndarray | None
@@ -63,8 +62,7 @@ class Windows(NamedTuple):
     points, deltas (..., 4, 9, 3) m: places of the effectors from 0.2 s before to 0.6 s after, and how far each goes
     in the frame that follows. next (..., 4, 3) m: their places in frame n + 1. hands_next (..., 2, 3, 3): the hands'
     rotations there, or None. sides (..., 2): b_l, b_r, which side throws or kicks. impact (..., 3) m. phase (...):
-    the motion phase.
-    """
+    the motion phase."""
 
     points: np.ndarray
     deltas: np.ndarray
@@ -79,8 +77,7 @@ def windows(description: Description, reference: np.ndarray | None = None) -> Wi
     """The windows (T, ...) of all frames. reference: the speed curve for warped phases (§9.3), else eq. 7.2.
 
     Between frames, places are linear; beyond the ends they are the known ones, then they keep still. The last frame's
-    `next` and `hands_next` are therefore the frame's own, or the first of `after`.
-    """
+    `next` and `hands_next` are therefore the frame's own, or the first of `after`."""
     frames = np.arange(len(description))
     seen = frames[:, None] + np.arange(-BACK, AHEAD + 1) * (STEP * description.fps)
     points = places_at(description, seen)

@@ -26,8 +26,7 @@ class Example:
     name, subject: for reports, and for telling subjects apart. motion: at the model's rate. limb: index into
     `EFFECTORS`. release: fractional frame at which the ball leaves. impact: (3,) m. launch: (3,) m/s, the ball's
     velocity as it leaves, or None. stature: metres. before (B, 4, 3), after (A, 4, 3): places of the effectors beyond
-    the motion's ends, or None.
-    """
+    the motion's ends, or None."""
 
     name: str
     subject: str
@@ -58,8 +57,7 @@ def example_of(
     limb: index or name of one of `EFFECTORS`. release: seconds from the motion's first frame. impact (3,) m and
     launch (3,) m/s, in the world. span: first and last second that the example has, the whole motion without it; what
     the motion shows beyond them is kept as `before` and `after`. InputError where the impact is on top of the hips,
-    or the skeleton lacks a limb.
-    """
+    or the skeleton lacks a limb."""
     first, last = (0.0, motion.duration) if span is None else (max(span[0], 0.0), min(span[1], motion.duration))
     count = int(np.floor((last - first) * fps + 1e-6)) + 1
     if count < 2:

@@ -246,8 +246,7 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
     """Place less `origin` (..., 3) m, and turn as six numbers, of the hips as hands and feet carry them: (..., 9).
 
     They are turned about the upright and moved as brings the effectors of frame n nearest to where they are wanted in
-    n + 1, in least squares in which feet count three times as much (Procrustes; Kabsch 1976 with one axis).
-    """
+    n + 1, in least squares in which feet count three times as much (Procrustes; Kabsch 1976 with one axis)."""
     now = picked(pose.positions, chains.effectors, -2, xp)
     share = _COUNTS[:, None]
     middle, wanted = (now * share).sum(-2), (window.next * share).sum(-2)

@@ -40,8 +40,7 @@ class Options:
     where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of
     the way to where they are wanted (feet that are to stand, all of it), before the next is predicted (§7.7.3).
     blend: networks see trajectories that begin where hands and feet are. limits: joints stay within the range of the
-    training data, and what networks are asked stays near it, so that no error feeds itself (§9.4).
-    """
+    training data, and what networks are asked stays near it, so that no error feeds itself (§9.4)."""
 
     pose_iterations: int = 75
     tolerance: float = 0.01
@@ -63,8 +62,7 @@ class Generated:
     effectors, predicted: (T, 4, 3) m, where hands and feet are, and where the networks had them in that frame before
     anything was corrected. wanted: (T, 4, 3) m. over: (T, J) radians by which joints would have been beyond their
     limits. floating: (T, j, 3) m, the places that a single network says of the joints `Chains.joints`, else None.
-    iterations: of the start pose. seconds: what it took.
-    """
+    iterations: of the start pose. seconds: what it took."""
 
     motion: Motion
     effectors: np.ndarray
@@ -98,8 +96,7 @@ def generate(
 
     start: the state in the first frame, in the normalised frame; without it one of the examples' poses is taken and
     predicted until it fits. InputError where the description's rate is not the model's, hands are not given that the
-    model has to be given, or its networks lose the body.
-    """
+    model has to be given, or its networks lose the body."""
     options = options or Options()
     _check(model, description)
     began = time.perf_counter()

@@ -24,8 +24,7 @@ class Pose(NamedTuple):
     """A body's state in one frame, or in many: leading axes are free.
 
     root (..., 3) m, the root joint's place. local (..., J, 3, 3), each joint against its parent. positions (..., J, 3)
-    m and turns (..., J, 3, 3), in the world. moved (..., J, 3) m, how far each joint came since the frame before.
-    """
+    m and turns (..., J, 3, 3), in the world. moved (..., J, 3) m, how far each joint came since the frame before."""
 
     root: np.ndarray
     local: np.ndarray
@@ -37,8 +36,7 @@ class Pose(NamedTuple):
 def places_and_turns(offsets, parents, root, local, xp=np):
     """Forward kinematics: positions (..., J, 3) m and turns (..., J, 3, 3) in the world.
 
-    offsets (J, 3) m, parents (J,) with -1 for the root, which comes first; root (..., 3) m; local (..., J, 3, 3).
-    """
+    offsets (J, 3) m, parents (J,) with -1 for the root, which comes first; root (..., 3) m; local (..., J, 3, 3)."""
     positions, turns = [root], [local[..., 0, :, :]]
     for joint in range(1, len(parents)):
         parent = parents[joint]
@@ -127,8 +125,7 @@ def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local:
     """A pose with other rotations of some `joints`, and all `joints` where these bring them; the rest as it was.
 
     joints: indices, parents first. root: (..., 3) m, the root joint's place. local: joint -> (..., 3, 3), against its
-    parent. given: joint -> (..., 3, 3), in the world.
-    """
+    parent. given: joint -> (..., 3, 3), in the world."""
     places, turns, changed = {}, {}, dict(local)
     for joint in joints:
         parent = skeleton.parents[joint]

@@ -47,8 +47,7 @@ def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.
 
     axes: of `hinge_axes`. turn_kept: hand or foot keeps its turn in the world (a given hand; every foot, so that the
     toe comes to its place); else it rides on the lower bone. All joints of the limb are right afterwards, in numpy
-    and in jax.
-    """
+    and in jax."""
     upper, middle, end, effector = _joints(chains, number)
     places, turns, parents = after.positions, after.turns, chains.skeleton.parents
     tip = places[..., effector, :]
@@ -171,8 +170,7 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
 
     Returns turn_upper, turn_lower (..., 3, 3), to be put left of the bones' world rotations, and the end joint's new
     place (..., 3). Bones keep their lengths; a target out of reach is neared along its line, one too close to `top` is
-    kept away by the difference of the bones.
-    """
+    kept away by the difference of the bones."""
     upper, lower = middle - top, end - middle
     long_upper, long_lower = _length(upper, xp), _length(lower, xp)
     along, down = upper / long_upper, lower / long_lower

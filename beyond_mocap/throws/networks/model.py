@@ -40,8 +40,7 @@ class ModelSettings:
     (§9.3). ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were
     trained on what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would
     reach (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
-    (`features.carry_hips`). fps: frames per second. action: throw or kick.
-    """
+    (`features.carry_hips`). fps: frames per second. action: throw or kick."""
 
     kind: str = "hierarchy"
     points: int = 4
@@ -85,8 +84,7 @@ class ThrowModel:
     of the leg to the toe in the training data (eq. 7.3). examples: recorded movements in the normalised frame, at the
     model's rate, on its skeleton. stature: metres. joint_limits: (J, 3, 3) radians, as of `limits.learn` of the
     training data, or None. reference: (N,) the limb's speed over evenly spaced phases, which `warped` phases
-    are warped to, or None. trained_on: one line. notes: one line each.
-    """
+    are warped to, or None. trained_on: one line. notes: one line each."""
 
     settings: ModelSettings
     skeleton: Skeleton

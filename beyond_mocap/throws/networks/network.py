@@ -28,8 +28,7 @@ def forward(weights, biases, x, theta, xp=np, keep=None):
     weights: one (K, out, in) a layer. biases: one (K, out) a layer. Between layers stands an ELU, as in the PFNN
     (Holden, Komura and Saito 2017); the last layer is linear (eq. 3.21). keep: for training with dropout, one array or
     None for each layer, which multiplies what the layer is given: 0 or 1 / retention (eq. 3.27). xp: numpy or
-    jax.numpy.
-    """
+    jax.numpy."""
     last = len(weights) - 1
     for layer, (weight, bias) in enumerate(zip(weights, biases)):
         if keep is not None and keep[layer] is not None:
@@ -60,8 +59,7 @@ class PhaseNetwork:
     """A trained network, arrays read-only.
 
     weights: one (K, out, in) a layer, K control points. biases: one (K, out) a layer. input_mean, input_scale (in,) and
-    output_mean, output_scale (out,): the first layer is given (x - mean) / scale, the answer is y scale + mean.
-    """
+    output_mean, output_scale (out,): the first layer is given (x - mean) / scale, the answer is y scale + mean."""
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]

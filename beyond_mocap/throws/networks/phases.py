@@ -31,8 +31,7 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
     effector: (T, 3) metres. release: the fractional frame, where the phase is `AT_RELEASE`. fps: frames per second.
 
     The second branch is printed as c + part; the phase is to end at 1, so it is c + (1 - c) part. Where the limb keeps
-    still before or after the release, time takes the place of distance.
-    """
+    still before or after the release, time takes the place of distance."""
     _check(effector, fps)
     at = np.arange(len(effector), dtype=float)
     gone = distance_along(effector)
@@ -57,8 +56,7 @@ def _part(gone, low, high, at, first, last) -> np.ndarray:
 def distance_phase(distance, reach: tuple[float, float], xp=np):
     """The phase (...) of a leg whose toe is `distance` (...) metres from the leg's top (eq. 7.3), clipped to 0 .. 1.
 
-    reach: shortest and longest distance in the training data. xp: numpy or jax.numpy.
-    """
+    reach: shortest and longest distance in the training data. xp: numpy or jax.numpy."""
     low, high = reach
     return xp.clip((distance - low) / (high - low), 0.0, 1.0)
 
@@ -79,8 +77,7 @@ def reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, ro
     """The speed curve (N,) that examples are warped to: their mean, warped to it again `rounds` times so that what they
     share stays sharp.
 
-    examples: (effector (T, 3), release) of each. InputError where there is none.
-    """
+    examples: (effector (T, 3), release) of each. InputError where there is none."""
     curves = [speed_curve(effector, release, fps) for effector, release in examples]
     if not curves:
         raise InputError("reference curve", "no example", "one at least")
@@ -94,8 +91,7 @@ def warped_phase(effector: np.ndarray, release: float, fps: float, reference: np
     """The phase (T,) of each frame by dynamic time warping of the limb's speed to a reference curve (§9.3).
 
     What looks alike has the same phase then, also where one subject winds up longer than another. The release stays
-    pinned to `AT_RELEASE`: both sides of it are warped alone. reference: of `reference_curve`.
-    """
+    pinned to `AT_RELEASE`: both sides of it are warped alone. reference: of `reference_curve`."""
     _check(effector, fps)
     half = (len(reference) + 1) // 2
     curve = speed_curve(effector, release, fps, half)
@@ -123,8 +119,7 @@ def warp(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
     Dynamic time warping (Sakoe and Chiba 1978): the cheapest monotone road through |curve_i - reference_j|, within a
     band about the straight one. A moment that belongs to several indices is given their middle; flat stretches of the
-    road are made to rise, because a phase that stands still says nothing.
-    """
+    road are made to rise, because a phase that stands still says nothing."""
     cost = np.abs(curve[:, None] - reference[None, :])
     count, length = cost.shape
     best = np.full((count + 1, length + 1), np.inf)
@@ -180,8 +175,7 @@ def weigh_points(phase, points: int = 4, xp=np):
     One point is a plain feed-forward network. xp: numpy or jax.numpy.
 
     Written as one kernel around each point (the same four polynomials, by distance); the points before the first and
-    after the last are the first and the last again (eq. 3.26), so their weights are added to those.
-    """
+    after the last are the first and the last again (eq. 3.26), so their weights are added to those."""
     phase = xp.clip(xp.asarray(phase), 0.0, 1.0)[..., None]
     if points == 1:
         return xp.ones_like(phase)

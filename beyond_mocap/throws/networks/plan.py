@@ -63,8 +63,7 @@ def planned(examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed:
     """The description of a motion that lets a ball go as wished.
 
     launches (E, 3) m/s: how the ball left each example. seed: other weights, for another motion with the same aim; 0:
-    none. InputError where no example uses that limb.
-    """
+    none. InputError where no example uses that limb."""
     chosen, weights = alike(examples, launches, wish, seed)
     taken = [examples[index] for index in chosen]
     speed = float(weights @ np.linalg.norm(launches[chosen], axis=1))
