@@ -95,10 +95,10 @@ def passes(library: Library, scene: PassScene, progress: Callable[[float, str], 
     moved = tuple(PlayerPasses(who.name, one.take, one.gaps, one.moved) for who, one in zip(scene.players, players))
     report(1.0, "Done")
     return Passes(scene=scene, kind=ball_of(scene), plan=plan, ball=path, players=moved,
-                  warnings=(*plan.warnings, *_taken(library, plan), *told))
+                  warnings=(*plan.warnings, *list_unlabelled_strikes(library, plan), *told))
 
 
-def _taken(library: Library, plan: PassPlan) -> list[str]:
+def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
     """A line for each part but the foot that strikes with motions whose words say nothing of it."""
     clips: dict[str, set[str]] = {}
     for strike in plan.strikes:
