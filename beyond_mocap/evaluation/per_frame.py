@@ -1,6 +1,6 @@
 """The figures of a take frame by frame, and its footprints: what overlays and curves show of it.
 
-Nothing is measured here that the report does not measure: `root`, `feet` and `jerk` say how (`../shared/metrics.md`).
+Nothing is measured here that the report does not measure: `movement` says how (`../shared/metrics.md`).
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ _looking: dict = {}  # the thread that is looking, and what it saw
 
 @dataclass
 class _Kept:
-    """What was listed last: the clips, and the files as they were then (`watch`)."""
+    """What was listed last: the clips, and the files as they were then (`list_files`)."""
 
     clips: tuple["Listed", ...] = ()
     files: dict[str, tuple[int, int]] = field(default_factory=dict)

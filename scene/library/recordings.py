@@ -98,7 +98,7 @@ def read_words(rig: bpy.types.Object) -> tuple[ClipAnnotation, ...]:
 
 
 def read_words_at(rig: bpy.types.Object, fps: float, count: int) -> tuple[ClipAnnotation, ...]:
-    """What an armature's strips say, as rows in frames of a motion of `count` frames at `fps`; InputError as `said`."""
+    """What an armature's strips say, in frames of a motion of `count` frames at `fps`; InputError as `read_words`."""
     from ...beyond_mocap.library.keep_words import within
 
     timeline = lanes.read(rig, f"strips of {rig.name}")

@@ -52,7 +52,7 @@ def take(
     scene: bpy.types.Scene, ball: bpy.types.Object, body: bpy.types.Object, bone: str, first: int, last: int,
     how: str = "KEEP", settle: int = 4, skin: float = 0.03,
 ) -> BeyondMocapHold:
-    """Let a bone carry the ball from frame `first` until it is let go on `last`; how: one of `settings.HOLDS`; settle:
+    """Let a bone carry the ball from frame `first` until it is let go on `last`; how: one of `setting.HOLDS`; settle:
     frames within which it comes to where it is carried; skin: metres from the bone to what touches. InputError, and
     nothing changed, where it cannot be carried."""
     _check(ball, body, bone, first, last)

@@ -3,7 +3,7 @@
 The first pass chooses a cluster for every slot of 32 frames, the second a block from each chosen cluster; the slots are
 then halved twice, and each half is searched anew among the cluster that the parent's half belongs to. Cost per slot is
 alpha times the annotation cost D (eq. 18, 19) and between slots 1 - alpha times the continuity cost C (eq. 17), taken
-in units of `transition_cost.typical_distance`.
+in units of `block_costs.typical_distance`.
 
 Decisions where the paper is silent or misprinted:
 - A slot that holds a key moment offers only blocks that show a serving clip's key frame at exactly that frame. Eq. 20

@@ -2,7 +2,7 @@
 at a time with numpy or jax, as the layer that networks are trained with (§9.4), and all four at once for use.
 
 By two-bone inverse kinematics: the knee or elbow bends or stretches until the limb has the length that is asked for,
-then the whole limb turns to the target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `motion.reach` does the same
+then the whole limb turns to the target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `motion.limb` does the same
 over all frames of a finished motion; here one frame follows another, nothing may look ahead, and every step must have a
 derivative.
 """
