@@ -73,7 +73,7 @@ def _speed_text(estimated: np.ndarray, measured: np.ndarray) -> html.Html:
     if np.isfinite(found.normal):
         lines.append(f"Normality of the differences (Shapiro-Wilk): p = {found.normal:.3f}.")
     if np.isfinite(found.wilcoxon):
-        lines.append(f"No difference (Wilcoxon, compare_speeds, two-sided): p = {found.wilcoxon:.4f}.")
+        lines.append(f"No difference (Wilcoxon, paired, two-sided): p = {found.wilcoxon:.4f}.")
     else:
         lines.append(f"Too few or too equal for the paired test, which needs {LEAST} throws.")
     return html.fragment(*(html.element("p", line) for line in lines))

@@ -50,7 +50,7 @@ def test_a_folder_of_throws_becomes_a_page(tmp_path):
     }  # fmt: skip
     page = trials_report(written(tmp_path, reports))
     assert page.count("data:image/png") == 5
-    assert "24 throws with a measured speed" in page and "Wilcoxon" in page
+    assert "24 throws with a measured speed" in page and "Wilcoxon, paired, two-sided" in page
     assert "<bob>" not in page and "&lt;bob&gt;" in page
     assert all(f"t{i:02d}" in page for i in range(24))
 
