@@ -122,7 +122,7 @@ def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: 
 
     edit: at the library's rate, from the track's first time on; its clips are those of `library`, which has made ones
     (`Library.extended`) where it shows them. What gave way is not told in its warnings: it may be a part of a longer
-    take, of which `evaluation.evaluate` tells it. The same arguments and numpy give the same bits."""
+    take, of which `evaluation.report.evaluate` tells it. The same arguments and numpy give the same bits."""
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1):

@@ -32,7 +32,7 @@ class KeyResult:
 
     @property
     def touching(self) -> tuple[str, ...]:
-        """The words that say which part meets the ball (`striking.meeting_words`)."""
+        """The words that say which part meets the ball (`ball_contact.meeting_words`)."""
         return meeting_words(self.words, self.asked.words)
 
 

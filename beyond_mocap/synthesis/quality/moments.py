@@ -114,7 +114,7 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
 
 def ball_gap(played: Played, moment: Moment) -> float:
     """Distance in metres between the striking surface and the surface of the ball as written out, at the output frame
-    nearest to the asked time (`striking.contact_gap`, overlap counted as distance too); NaN without ball or part.
+    nearest to the asked time (`ball_contact.contact_gap`, overlap counted as distance too); NaN without ball or part.
 
     The part is that of the words which are played there; of the asked ones where those touch no ball."""
     if played.ball is None:
@@ -127,7 +127,7 @@ def ball_gap(played: Played, moment: Moment) -> float:
 def met(played: Played, moment: Moment) -> tuple[float, float]:
     """Seconds on the track's clock at which the ball is met, and the gap there, m, as `ball_gap` measures it. Both are
     the key moment's, but for dives, in which a hand meets the ball at its nearest on the flight
-    (`striking.met_within`); NaN without ball or part."""
+    (`ball_contact.met_within`); NaN without ball or part."""
     last = min(moment.frame + int(met_within(touching_words(moment)) * played.motion.fps), len(played.motion) - 1)
     frames = range(moment.frame, last + 1)
     gaps = [ball_gap(played, replace(moment, frame=frame)) for frame in frames]
@@ -138,7 +138,7 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
 
 
 def touching_words(moment: Moment) -> tuple[str, ...]:
-    """The words that say which part meets the ball (`striking.meeting_words`)."""
+    """The words that say which part meets the ball (`ball_contact.meeting_words`)."""
     return meeting_words(moment.words, moment.asked.words)
 
 
