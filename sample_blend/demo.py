@@ -102,7 +102,7 @@ def synthesize(load, settings, steps) -> list[dict]:
         reports.append(load("beyond_mocap.evaluation.report").evaluate(take, plan.track, clips))
         reports[-1]["seconds"].update(load=load_seconds, library=library_seconds, total=total)
         player.take = session.keep_take(plan, take)
-        player.quality, player.moments = quality.quality(reports[-1]), quality.moments(reports[-1])
+        player.quality, player.moments = quality.quality_lines(reports[-1]), quality.moment_lines(reports[-1])
     return reports
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..base.errors import InputError
 from ..base.settings.options import add_options
-from .outputs import Told, Writer, check_outputs, naming
+from .outputs import Told, Writer, check_outputs, naming, writer_of
 
 
 def add_mirror(verbs) -> argparse.ArgumentParser:
@@ -37,6 +37,7 @@ def run_mirror(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..motion.mirror import mirror
 
     check_outputs(options.output)
+    writer_of(options.output, {}, others="")
     clip = bvh.read(options.input, options.unit)
     with naming(options.input):
         twin = mirror(clip.motion)
@@ -51,6 +52,7 @@ def run_retarget(options, told: Told, writers: Mapping[str, Writer]) -> None:
     from ..library.one_skeleton import bring_one
 
     check_outputs(options.out, never=(options.input, options.to, options.map))
+    writer_of(options.out, {}, others="")
     clip, target = bvh.read(options.input, options.unit), bvh.read(options.to, options.to_unit)
     try:
         motion = bring_one(clip.motion, target.motion, options.map)

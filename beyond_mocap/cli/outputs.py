@@ -77,14 +77,16 @@ def naming(path):
         raise InputError(path, str(error)) from None
 
 
-def writer_of(out: Path, writers: Mapping[str, Writer]) -> Writer:
-    """Who writes a file with the suffix of `out`; `writers`: by suffix, beside BVH."""
+def writer_of(out: Path, writers: Mapping[str, Writer], others: str = "inside Blender .blend, .fbx, .glb and .usdc can "
+              "be written too") -> Writer:
+    """Who writes a file with the suffix of `out`; `writers`: by suffix, beside BVH; others: what to do next where there
+    are none, "" for no more than another ending."""
     known = {".bvh": write_bvh, **writers}
     if out.suffix.lower() not in known:
         raise InputError(
             out, f"no file ending in {out.suffix} can be written here" if out.suffix else "no file ending",
             f"one of {', '.join(sorted(known))}",
-            "choose another ending" if writers else "inside Blender .blend, .fbx, .glb and .usdc can be written too",
+            "choose another ending" if writers or not others else others,
         )
     return known[out.suffix.lower()]
 
@@ -103,6 +105,8 @@ def check_outputs(*paths: Path | None, never: tuple[Path | None, ...] = ()) -> N
         folder = path.absolute().parent
         if path.is_dir():
             raise InputError(path, "is a folder", "a file name", "add a file name")
+        if path.exists() and not path.is_file():
+            raise InputError(path, "a device or a pipe", "a file name", "choose another place")
         if not folder.is_dir():
             raise InputError(path, "its folder does not exist", "an existing folder", "make the folder first")
         if not os.access(folder, os.W_OK | os.X_OK):

@@ -17,9 +17,12 @@ from ..base.errors import InputError
 def beside(path: str | os.PathLike, ending: str = ".part") -> Iterator[Path]:
     """A path beside `path` to write to. It takes the place of `path` when the block ends well, else it is gone.
 
-    ending: of that path's name, for writers that go by it. InputError where the folder is missing or cannot be written.
+    ending: of that path's name, for writers that go by it. A link stays one: the file that it leads to is written.
+    InputError where the folder is missing or cannot be written, and for devices and pipes.
     """
-    path = Path(path)
+    path = Path(os.path.realpath(path)) if os.path.islink(path) else Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():  # renamed over, a device would be gone
+        raise InputError(path, "a device or a pipe", "a file name", "choose another place")
     part = path.with_name(f".{path.name}.{os.getpid()}.{threading.get_ident()}{ending}")
     try:
         yield part

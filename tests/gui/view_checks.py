@@ -93,15 +93,14 @@ class timed:
             self.window.undraw(getattr(self.draw, name))
             self.window.draw(bpy.types.SpaceView3D, self.kept[name], when)
         if self.blf is not None:
-            self.draw.legend.blf, self.draw.legend.box = self.blf, self.box
+            self.draw.blf, self.draw.draw_box = self.blf, self.box
         for name, function in self.kept.items():
             setattr(self.draw, name, function)
 
     def without_graphics(self):
         """From here on all is done but the drawing itself: what remains is Python's time. llvmpipe's says nothing."""
-        legend = self.draw.legend
-        self.blf, self.box = legend.blf, legend.box
-        legend.blf, legend.box = Stand(self.blf, draw=lambda *_: None), lambda *_: None
+        self.blf, self.box = self.draw.blf, self.draw.draw_box
+        self.draw.blf, self.draw.draw_box = Stand(self.blf, draw=lambda *_: None), lambda *_: None
         self.counted, self.seconds = None, []
         self.draw._draw_batches = lambda context, batches: [mesh for _, mesh in batches]
         self.draw._draw_contacts = lambda shown: shown.prepared.frame(shown.seconds)

@@ -14,7 +14,7 @@ from beyond_mocap.annotation.labels import find_label, list_gaits, list_labels
 from beyond_mocap.base.errors import InputError
 
 TOP = pathlib.Path(__file__).parents[3]
-TOE_POKE = "toe_poke,toe poke,discrete,,foot,,sends,,low,,,low(running)\n"
+SIDE_POKE = "side_poke,side poke,discrete,,foot,,sends,,low,,,low(running)\n"
 
 SYNTHETIC = {  # builders of motions and matches, each of certain labels
     *(f"beyond_mocap/synthetic/{name}.py" for name in ("gait", "gait_tables", "gestures", "kicks", "moves", "volleys")),
@@ -64,8 +64,8 @@ def test_labels_say_what_they_do_with_the_ball():
 
 @pytest.mark.parametrize(
     "row, found",
-    [("kick,kick,discrete,,,,,,,,,", "again"), (TOE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
-     ("toe_poke,toe poke", "other cells")]
+    [("kick,kick,discrete,,,,,,,,,", "again"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
+     ("side_poke,side poke", "other cells")]
 )  # fmt: skip
 def test_a_wrong_row_is_reported_with_its_line(row, found, tmp_path, monkeypatch):
     table = tmp_path / "vocabulary.csv"
@@ -80,7 +80,7 @@ def test_a_new_label_is_one_row(tmp_path):
     ignored = shutil.ignore_patterns("__pycache__", "*.npz")
     shutil.copytree(TOP / "beyond_mocap", tmp_path / "beyond_mocap", ignore=ignored)
     with open(tmp_path / "beyond_mocap/annotation/vocabulary.csv", "a") as table:
-        table.write(TOE_POKE)
+        table.write(SIDE_POKE)
     env = {**os.environ, "PYTHONPATH": str(tmp_path)}
     told = subprocess.run([sys.executable, "-P", "-c", USES], env=env, capture_output=True, text=True)
     assert (told.returncode, told.stderr) == (0, "") and pathlib.Path(told.stdout.strip()).is_relative_to(tmp_path)
@@ -99,18 +99,18 @@ from beyond_mocap.annotation import ClipAnnotation
 from beyond_mocap.motion.retargeting.adult import adult_skeleton
 from beyond_mocap.synthesis.plan import Touched
 
-words = ("toe_poke", "right")
-timeline = parse_timeline("2.0 toe_poke right low", "a.txt", 30.0)
+words = ("side_poke", "right")
+timeline = parse_timeline("2.0 side_poke right low", "a.txt", 30.0)
 validate(timeline, known_words=(), start=0.0, end=4.0, where="a.txt")
-assert "toe_poke" in DISCRETE and spoken(("low", "right", "toe_poke")) == ("toe_poke", "right", "low")
-assert words_below(("toe_poke",)) == ("low",) and "toe_poke" in {one.word for one in options(Walk("moment"))}
+assert "side_poke" in DISCRETE and spoken(("low", "right", "side_poke")) == ("side_poke", "right", "low")
+assert words_below(("side_poke",)) == ("low",) and "side_poke" in {one.word for one in options(Walk("moment"))}
 assert [(one.part, one.side) for one in surfaces(adult_skeleton(), words)] == [("foot", "right")]
 assert may_use_foot(frozenset(words)) and _rank("foot", frozenset(words)) == _SAID
 
 kick, receive = Touched(2.2, True, "foot", "kick"), Touched(2.1, True, "foot", "receive")
 moved = known_touches._moved(Timeline(keys=(KeyMoment(2.0, words),)), (receive, kick))
 assert moved.keys[0].solved == 2.2
-assert act_of(ClipAnnotation(0, 9, 5, words)) == "toe_poke"
+assert act_of(ClipAnnotation(0, 9, 5, words)) == "side_poke"
 key = Key(0, 5.0, 0.0, 9.0, frozenset(("kick", "right")))
 assert nearest_serving((key,), words) == (key,)
 print(beyond_mocap.__file__)

@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 
 TOP = Path(__file__).resolve().parents[4]
-ROW = """        Setting(name="backward", default=0.0, least=0.0, most=10.0, option="--backward", tuning="path",
+ROW = """        Setting(name="walking_cost", default=0.0, least=0.0, most=10.0, option="--walking-cost", tuning="path",
             help="of missed speed that a walking clip costs", tooltip="Costs of walking"),
 """
 TERM = """        walks = self.offer.showing(frozenset(("walking",)))[frame]
-        yield "backward", np.float32(self.wanted.plan.backward) * walks
+        yield "walking_cost", np.float32(self.wanted.plan.walking_cost) * walks
 """
 TRY = """
 from beyond_mocap.base.errors import InputError
@@ -25,12 +25,12 @@ import numpy as np, sys
 library = build(sys.argv[1])
 times = np.arange(0.0, 4.0, 0.1)
 track = Track(times, np.stack([1.4 * times, 0.0 * times], axis=1))
-for backward in (0.0, 0.7):
-    take = synthesize(library, Plan(track=track, backward=backward))
+for walking_cost in (0.0, 0.7):
+    take = synthesize(library, Plan(track=track, walking_cost=walking_cost))
     found = explain_choices(library, resolve_plan(take.plan, library), take.edit)
-    print(round(sum(reason.costs.get("backward", 0.0) for reason in found), 3))
+    print(round(sum(reason.costs.get("walking_cost", 0.0) for reason in found), 3))
 try:
-    Plan(track=track, backward=11.0)
+    Plan(track=track, walking_cost=11.0)
 except InputError as error:
     print(error)
 """
@@ -52,7 +52,7 @@ def test_two_files_make_a_term_that_users_weigh(clips_folder, tmp_path):
                           text=True, timeout=120)  # fmt: skip
     assert said.returncode == 0, said.stderr
     without, weighed, limits = said.stdout.splitlines()
-    assert (float(without), limits) == (0.0, "backward: 11; expected 0 to 10") and float(weighed) > 0.0, said
+    assert (float(without), limits) == (0.0, "walking_cost: 11; expected 0 to 10") and float(weighed) > 0.0, said
     listed = subprocess.run([sys.executable, "-m", "beyond_mocap", "synthesize", "--help"], env=shown, cwd=tmp_path,
                             capture_output=True, text=True, timeout=120)  # fmt: skip
-    assert "--backward" in listed.stdout
+    assert "--walking-cost" in listed.stdout

@@ -1,0 +1,37 @@
+"""Files are written whole or not at all: through links, never over devices and pipes."""
+
+import os
+import stat
+
+import pytest
+
+from beyond_mocap.base.errors import InputError
+from beyond_mocap.cli.main import main
+from beyond_mocap.files.whole import atomic_write
+
+
+def test_a_link_stays_one_and_its_file_is_written(tmp_path):
+    (tmp_path / "file").write_text("before")
+    (tmp_path / "link").symlink_to("file")
+    atomic_write(tmp_path / "link", "after")
+    assert (tmp_path / "link").is_symlink() and (tmp_path / "file").read_text() == "after"
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["file", "link"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no pipes with names")
+def test_a_pipe_is_left_as_it_is(tmp_path, clip_file, capsys):
+    os.mkfifo(tmp_path / "pipe.bvh")
+    with pytest.raises(InputError, match="a device or a pipe; expected a file name"):
+        atomic_write(tmp_path / "pipe.bvh", "text")
+    clip = clip_file(tmp_path / "clip.bvh")
+    assert main(["mirror", str(clip), str(tmp_path / "pipe.bvh")]) == 2
+    assert "a device or a pipe" in capsys.readouterr().err
+    assert stat.S_ISFIFO((tmp_path / "pipe.bvh").stat().st_mode)
+    assert sorted(one.name for one in tmp_path.iterdir()) == ["clip.bvh", "clip.txt", "pipe.bvh"]
+
+
+def test_mirror_and_retarget_write_bvh_only(tmp_path, clip_file, capsys):
+    clip = str(clip_file(tmp_path / "clip.bvh"))
+    for verb in (["mirror", clip, "{}"], ["retarget", clip, "--to", clip, "--out", "{}"]):
+        assert main([word.format(tmp_path / "out.fbx") for word in verb]) == 2
+        assert "no file ending in .fbx" in capsys.readouterr().err and not (tmp_path / "out.fbx").exists()
