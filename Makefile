@@ -8,7 +8,7 @@ REAL_BLENDER ?= ../shared/tools/real-blender
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:
-.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables extension extension-all window-test window-bench \
+.PHONY: help venv venv-oldest training lint quick test test-core test-blender test-oldest test-training demo bench weights tables docs extension extension-all window-test window-bench \
   pictures clean
 
 help:
@@ -21,6 +21,7 @@ help:
 	@echo 'make bench          time and quality on recordings'
 	@echo 'make weights        the shipped networks anew: made throws and kicks, trained on; some minutes'
 	@echo 'make tables         the pages of docs/ that come from the code: settings, providers'
+	@echo 'make docs           the documents as a site, into build/docs; broken links are errors'
 	@echo 'make extension      the zip for Blender, into build/extension; PLATFORMS="linux-x64 windows-x64" for others'
 	@echo 'make extension-all  one zip for each platform: linux-x64 windows-x64 macos-arm64 macos-x64'
 	@echo 'make window-test    install the zip in a real Blender and press its buttons; skipped where none can be had'
@@ -99,6 +100,11 @@ weights: training
 tables: venv
 	.venv/bin/python packaging/pages.py
 
+docs: venv
+	@packaging/venv.sh docs
+	.venv-docs/bin/mkdocs build --quiet --strict
+	@echo 'the documents stand in build/docs/index.html'
+
 extension: venv
 	.venv/bin/python packaging/build.py --platforms $(PLATFORMS)
 
@@ -115,4 +121,4 @@ pictures: extension
 	@tests/gui/run $(REAL_BLENDER) tests/gui/pictures.py
 
 clean:
-	rm -rf build .venv .venv-4.5 .venv-training .venv-lint
+	rm -rf build .venv .venv-4.5 .venv-training .venv-lint .venv-docs
