@@ -355,7 +355,7 @@ class _Search:
         count, size, held = len(rows), len(free), slopes.shape[1]
         rest = rows.copy()
         rest[:, free] = 0.0
-        # Karush-Kuhn-Tucker system: Hessian, constraints and their transpose, tiny negative diagonal for the multipliers
+        # Karush-Kuhn-Tucker system: Hessian, constraints and their transpose, tiny negative diagonal of the multipliers
         matrix = np.zeros((count, size + held, size + held))
         matrix[:, :size, :size] = hessian[:, free][:, :, free]
         matrix[:, size:, :size] = slopes[:, :, free]
