@@ -175,7 +175,7 @@ def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | 
 
 
 def _clipped() -> optax.GradientTransformation:
-    """Build a transformation that clips each network's gradient to CLIP separately, so that separately trained
+    """Build a transformation that clips each network's gradient to MAX_GRADIENT separately, so that separately trained
     networks stay independent.
     """
 

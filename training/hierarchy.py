@@ -94,7 +94,7 @@ class Networks:
             config: configuration of the training.
             leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3.
             limits: joint limits, which give the bending direction of elbows and knees.
-            held: (N,) bool, examples that `fit_linear` can leave out.
+            is_held_out: (N,) bool, examples that `fit_linear` can leave out.
         Raises:
             InputError: if networks that are trained alone have to feed frames back.
         """

@@ -91,7 +91,7 @@ class Sums(NamedTuple):
         products: (C, out) with the outputs.
         rows: number of rows.
         points: number of control points.
-        guides: number of last inputs with the relative ridge `GUIDE`.
+        guides: number of last inputs with the relative ridge `GUIDE_RIDGE`.
     """
 
     squares: np.ndarray

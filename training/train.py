@@ -148,7 +148,7 @@ def least_astray(
     Args:
         problem: the training problem.
         held: examples that the regression does not use; if empty, the largest ridge is returned.
-        model_of: function that builds a model from parameters and a line of text.
+        build_model: function that builds a model from parameters and a line of text.
         cancelled: returns True to stop.
     """
     if not held:

@@ -44,10 +44,10 @@ class Freedom:
     """What may be changed besides wrist or ankle, each to either side.
 
     Attributes:
-        turn: rad, rotation about the start.
+        rotation: rad, rotation about the start.
         pace: share of the playback rate.
         release: s.
-        elsewhere: the body may begin at another position, so that its foot reaches a ball at a given position.
+        start_position: the body may begin at another position, so that its foot reaches a ball at a given position.
     """
 
     turn: float = np.radians(15.0)
@@ -73,12 +73,12 @@ class Corrected:
         spin: (3,) rad/s of the ball then.
         seconds: s until it is at the target.
         miss: m between ball and target then.
-        moved: m, largest displacement of the wrist or ankle.
+        displacement: m, largest displacement of the wrist or ankle.
         shift: (T, 3) m, displacement of the wrist or ankle in each frame.
-        turned: rad by which the body was rotated about its start.
+        rotation: rad by which the body was rotated about its start.
         pace: factor of the playback rate.
-        later: s by which the release was moved, at that pace.
-        elsewhere: m by which the start was moved.
+        release_delay: s by which the release was moved, at that pace.
+        start_offset: m by which the start was moved.
         gap: m between foot and ball, 0 for throws.
     """
 
@@ -309,14 +309,15 @@ class _Search:
         """Compute the change of lowest cost with which the ball hits, according to the derivatives, for N releases.
 
         Args:
-            points: (N, K, 3) m of hand or foot, changed by `now`.
+            points: (N, K, 3) m of hand or foot, changed by `current`.
             velocities: (N, K, 3) m/s.
-            now: present change.
+            current: present change.
             start: (3,) m of the ball.
             cost: (2, 2) cost of a shift.
-            follows: response of the limb, see `ShiftedLimb`.
+            response: response of the limb, see `ShiftedLimb`.
             fixed: indices of the change that stay.
-            near: minimise the distance to `now` instead, which converges where the derivatives hold only nearby.
+            stays_near: minimise the distance to `current` instead, which converges where the derivatives hold only
+                nearby.
         Returns:
             Changes (N, 9 + F), and their costs (N,).
         """
@@ -373,11 +374,11 @@ class _Search:
         """Compute the errors and their derivatives with respect to the change.
 
         Args:
-            points: (N, K, 3) m, changed by `now`.
+            points: (N, K, 3) m, changed by `current`.
             velocities: (N, K, 3) m/s.
-            now: present change.
+            current: present change.
             start: (3,) m of the ball.
-            follows: response of the limb, see `ShiftedLimb`.
+            response: response of the limb, see `ShiftedLimb`.
         Returns:
             Errors (N, 3 + G) at target and contact, their derivatives (N, 3 + G, S), the ball's speed (N,) and its
             derivatives (N, S).

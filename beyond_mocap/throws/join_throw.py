@@ -56,9 +56,9 @@ class JoinedThrow:
         release: s on that clock at which the ball leaves.
         first: frame with the first frame of the throw.
         end: frame after the last of the throw.
-        kept: (2,) frames between which it is exactly as generated.
-        moved: (3,) m by which the following motion was moved to continue from the throw.
-        turned: rad by which it was rotated about the vertical.
+        unblended: (2,) frames between which it is exactly as generated.
+        offset: (3,) m by which the following motion was moved to continue from the throw.
+        rotation: rad by which it was rotated about the vertical.
         warnings: warnings for people.
     """
 
@@ -84,12 +84,12 @@ def join_throw(
     """Join a throw to the motion around it.
 
     Args:
-        own: the motion; if it ends before the throw, its ends are held.
+        motion_around: the motion; if it ends before the throw, its ends are held.
         start: s of its first frame.
         throw: the throw on the same skeleton, at its final position.
         release: s in the throw at which the ball leaves.
-        at: requested s of the release on the clock of `own`.
-        goes_on: move and rotate the following motion so that it continues where the throw ends.
+        at: requested s of the release on the clock of `motion_around`.
+        continues: move and rotate the following motion so that it continues where the throw ends.
         fade: s of the blend at either end.
     Raises:
         InputError: if the skeletons differ, or the throw is too short.
@@ -253,7 +253,7 @@ def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Mo
     Args:
         throw: the throw; what is left stays bit for bit.
         release: s of its release.
-        keeps: s of standing to keep at either end.
+        margin_s: s of standing to keep at either end.
     Returns:
         The throw, and s from its first frame to its release.
     """

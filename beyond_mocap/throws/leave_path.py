@@ -33,13 +33,13 @@ class _Stretch:
     """Frames of a motion around a throw.
 
     Attributes:
-        own: the motion with its ends held.
+        own_motion: the motion with its ends held.
         start: s of its first frame.
         low: first frame that may change.
         first: first frame of the throw.
         end: frame after the throw.
         high: frame after the last that may change.
-        comes_back: whether the body returns to its own path.
+        returns: whether the body returns to its own path.
     """
 
     own: Motion
@@ -203,9 +203,7 @@ def _easy_speed(own: Motion) -> float:
 
 
 def _most_alike(apart: np.ndarray, low: int, high: int, fade: int) -> int:
-    """Find the frame of low .. high from which two motions with distances `apart` (T,) m are most similar for `fade`
-    frames.
-    """
+    """Find the frame of low .. high from which two motions are most similar for `fade` frames; distances (T,) m."""
     low, high = max(low, 0), min(high, len(apart)) - fade
     if high <= low:
         return max(min(low, len(apart) - fade), 0)

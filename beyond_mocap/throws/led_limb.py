@@ -1,6 +1,6 @@
 """Move the path of a limb's end so that it has another position and velocity at one instant.
 
-Of all shifts s(t) that are zero outside a window, the one with the smallest integral of |s|^2 + SOFT^4 |s''|^2 is
+Of all shifts s(t) that are zero outside a window, the one with the smallest integral of |s|^2 + SHIFT_TIME^4 |s''|^2 is
 chosen: it begins and ends within some hundredths of a second without a corner.
 """
 
@@ -72,7 +72,7 @@ class LedLimb:
         shifts: possible shifts.
         window: the body in the frames of the shifts.
         limb: its limb at rest.
-        hold: limits the joints, None if they have no limits.
+        limit_rotations: limits the joints, None if they have no limits.
     """
 
     motion: Motion
@@ -121,6 +121,6 @@ class LedLimb:
 
 
 def at_once(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives of `LedLimb.measure_response` for K points that follow exactly."""
+    """Return the derivatives of `ShiftedLimb.measure_response` for K points that follow exactly."""
     both = np.repeat(np.eye(6)[:, None, :], count, axis=1)
     return both[..., :3], both[..., 3:]

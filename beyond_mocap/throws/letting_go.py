@@ -3,7 +3,7 @@
 Both are points carried by joints, between frames too (`motion.motion`): the ball in the hand, the ends of the foot's
 line. Their position and velocity at one instant determine how the ball leaves.
 
-A ball at rest leaves along the line from the foot's surface to its centre `RATIO` times as fast as the foot moves:
+A ball at rest leaves along the line from the foot to its centre `SPEED_RATIO` times as fast as the foot moves:
 (1 + e) M / (M + m) for a foot of effective mass M, about 1.2 in good kicks (Lees and Nolan 1998, J. Sports Sci. 16,
 211-234; Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165). Across that line friction carries the ball's surface
 along with the foot up to its limit, as the ground does at a bounce (`ball.physics`), which causes spin (Asai, Carre,
@@ -82,7 +82,7 @@ class AtFoot:
 
     Attributes:
         side: "left" or "right".
-        place: (3,) m of the ball's centre, None: to be chosen.
+        position: (3,) m of the ball's centre, None: to be chosen.
     """
 
     side: str

@@ -64,7 +64,7 @@ class RunUpResult:
     Attributes:
         motion: the whole motion.
         start: s of its first frame on the track's clock.
-        seams: frames at which another clip begins.
+        transitions: frames at which another clip begins.
         warnings: warnings for people.
     """
 

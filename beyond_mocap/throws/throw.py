@@ -2,7 +2,7 @@
 
     thrown = throw_at(model, ThrowRequest(target=(18.0, 2.0, 1.2)))
 
-`throws.networks.plan` blends a description from the model's examples, `generate` generates the motion,
+`throws.networks.plan` blends a description from the model's examples, `throws.networks.generate` generates the motion,
 `throws.correction` changes it as physics requires, and `ball.flight` computes the flight of the ball.
 """
 
@@ -99,7 +99,7 @@ class _Made:
         plan: plan that it was generated from.
         motion: the motion.
         release: s of the release.
-        raw: m, mean distance of hands and feet from their targets before any correction.
+        network_deviation: m, mean distance of hands and feet from their targets before any correction.
         limits: joint limits of the limb.
     """
 

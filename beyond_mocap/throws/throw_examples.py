@@ -127,7 +127,7 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
             )
     wanted = " or ".join(sorted(ACTIONS[action].words))
     return InputError(
-        folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
+        folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the label {wanted}",
         f"write NAME.txt beside NAME.bvh, or {TABLE_NAME}; see {_PAGE}",
     )
 

@@ -99,16 +99,16 @@ class Thrown:
         flight: flight of the ball.
         target: (3,) m.
         impact: (3,) m, where the ball passes the target.
-        moved: m, largest displacement of the wrist or ankle by the correction.
+        displacement: m, largest displacement of the wrist or ankle by the correction.
         shift: (T, 3) m, displacement of the wrist or ankle in each frame.
-        turned: rad by which the body was rotated (see `CorrectedMotion`).
+        rotation: rad by which the body was rotated (see `CorrectedMotion`).
         pace: playback rate that was applied.
-        later: s by which the release was moved.
-        elsewhere: m by which the start was moved.
-        slowest: m/s, lowest speed at which a ball reaches the target.
-        asked_speed: m/s requested, or the actual speed without a request.
-        raw_deviation: m, mean distance of hands and feet from their targets before any inverse kinematics.
-        beyond: rad, largest excess of a joint of the corrected limb over the model's limits; only other bones or
+        release_delay: s by which the release was moved.
+        start_offset: m by which the start was moved.
+        min_speed: m/s, lowest speed at which a ball reaches the target.
+        requested_speed: m/s requested, or the actual speed without a request.
+        network_deviation: m, mean distance of hands and feet from their targets before any inverse kinematics.
+        limit_excess: rad, largest excess of a joint of the corrected limb over the model's limits; only other bones or
             another frame rate can cause it, before any correction.
         examples: names and weights of the blended examples.
         warnings: warnings for people.

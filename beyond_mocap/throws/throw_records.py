@@ -30,7 +30,7 @@ class Action:
     """An action to look for.
 
     Attributes:
-        words: labels, any of which marks the action.
+        labels: labels, any of which marks the action.
         limbs: indices of LIMBS.
         before: shortest and longest time, s, to include before the release.
         after: shortest and longest time, s, to include after the release.

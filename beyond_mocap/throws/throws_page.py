@@ -49,7 +49,7 @@ _FIGURES = (
 """Key of the report, factor, digits, unit, description."""
 _OF_BALL = ("impact_m", "far_impact", "own_impact", "impacts_culled")
 _COLUMNS = (
-    ("impact", 1.0, 2, "impact", "m"), ("head", 1.0, 1, "head", "°"), ("head_share", 1.0, 2, "head turns", "×"),
+    ("impact", 1.0, 2, "impact", "m"), ("head", 1.0, 1, "head", "°"), ("head_share", 1.0, 2, "head rotation", "×"),
     ("jerk", 1.0, 2, "jerk", "×"), ("beyond", 100.0, 1, "beyond", "%"), ("seconds", 1.0, 2, "takes", "s"),
 )
 _LABEL, _WIDTH, _RIGHT, _LINE, _TOP = 210.0, 680.0, 30.0, 20.0, 8.0  # px

@@ -167,7 +167,7 @@ def keys(
 
     Args:
         scene: the scene.
-        wish: settings of the throw.
+        settings: settings of the throw.
         result: the throw.
         ball: the ball, None for one without an earlier motion.
     Returns:

@@ -41,20 +41,20 @@ class Order:
 
     Attributes:
         body: name of the armature.
-        act: "throw" or "kick".
+        action: "throw" or "kick".
         limb: one of EFFECTORS.
         skeleton: skeleton of the armature; of a control rig, that of the bones that `table` names.
         table: part -> bone of a control rig, empty for others.
-        lift: m by which a rig's soles are thicker than those of its skeleton.
+        sole_lift: m by which a rig's soles are thicker than those of its skeleton.
         fps: frames per second of the scene.
-        own: motion of the armature in the scene's metres, None if it has none.
+        own_motion: motion of the armature in the scene's metres, None if it has none.
         first: scene frame at which that motion begins.
         place: (2,) m, position of an armature without motion.
         facing: rad, heading of an armature without motion.
         targets: (F, 3) m, target on each frame from the release, (1, 3) if it is static.
         at: s of the release.
-        begins: s of the scene's first frame.
-        waits: the release may be later so that the throw does not begin before the scene.
+        scene_start: s of the scene's first frame.
+        may_wait: the release may be later so that the throw does not begin before the scene.
         speed: m/s, 0 for automatic.
         kind: kind of ball.
         ball_place: (3,) m of a ball that is kicked, None to be chosen.
@@ -205,7 +205,7 @@ def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last:
 
     Args:
         ball: the ball.
-        wish: settings of the throw.
+        settings: settings of the throw.
         first: first frame of the throw.
         last: last frame in the hand.
     Raises:

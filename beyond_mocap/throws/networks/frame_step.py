@@ -217,7 +217,7 @@ class OneFrame:
     def __call__(self, pose: Pose, window: Windows, bounded: bool = False) -> Pose:
         """Predict frame n + 1 from the state and the window of frame n, both of one frame.
 
-        `moved` stays that of n. With `bounded`, inputs are limited to `network.BOUND` (`PhaseNetwork.input_bounds`).
+        `moved` stays that of n. With `bounded`, inputs are limited to `PhaseNetwork.input_bounds`.
         """
         theta = np.array(weigh_points_at(float(window.phase), self.points), np.float32)
         after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)

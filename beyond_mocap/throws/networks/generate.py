@@ -237,7 +237,7 @@ class Stock:
         limb: (N,) limb of the example.
         example: (N,) index of the example.
         frame: (N,) index of the frame in its example.
-        late: (N,) progress, 0 at the beginning of the example, 1 at its end.
+        progress: (N,) progress, 0 at the beginning of the example, 1 at its end.
     """
 
     places: np.ndarray

@@ -124,9 +124,7 @@ class PhaseNetwork:
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Lowest and highest input (in,) near the training data, float32: `BOUND` scales or `LEAST_SPAN` about the
-        mean.
-        """
+        """Lowest and highest input (in,) near the training data, float32; see `INPUT_BOUND` and `MIN_INPUT_SPAN`."""
         mean = self.input_mean.astype(float)
         span = np.maximum(BOUND * np.abs(self.input_scale.astype(float)), LEAST_SPAN)
         return (mean - span).astype(np.float32), (mean + span).astype(np.float32)
