@@ -175,8 +175,9 @@ def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | 
 
 
 def _clipped() -> optax.GradientTransformation:
-    """Build a transformation that clips each network's gradient to MAX_GRADIENT separately, so that separately trained
-    networks stay independent.
+    """Build a transformation that clips the gradient of each network separately to MAX_GRADIENT.
+
+    Separately trained networks stay independent that way.
     """
 
     def update(updates, state, params=None):

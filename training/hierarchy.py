@@ -42,9 +42,7 @@ IK_SHARE = 0.5
 
 
 def joint_error(y, wanted, scale):
-    """Compute the first term of eq. 7.4: the mean square error of outputs y (B, out), each divided by its scale
-    (out,).
-    """
+    """Compute the first term of eq. 7.4: the mean square error of outputs y (B, out), divided by `scale` (out,)."""
     return jnp.mean(((y - wanted) / scale) ** 2)
 
 
@@ -61,8 +59,9 @@ def effector_error(name: str, chains: Chains, settings: ModelSettings, y, wanted
 
 
 def missed_ends(name: str, chains: Chains, settings: ModelSettings, y, wanted):
-    """Compute the mean square distance (m^2) of the ends of outputs y (B, out) from those of the truth, in the
-    chain's own reference frame.
+    """Compute the mean square distance (m^2) of the ends of outputs y (B, out) from those of the truth.
+
+    The ends are in the chain's own reference frame.
     """
     reached, told = (ends(name, chains, settings, one, ARRAYS) for one in (y, wanted))
     return _mean_square(reached - told)
@@ -132,8 +131,9 @@ class Networks:
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
 
     def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
-        """Compute regression sums of inputs and outputs (F, in), (F, out): of rows that are not held out, and of
-        those that are.
+        """Compute regression sums of the rows that are not held out, and of those that are.
+
+        `parts` are pairs of inputs (F, in) and outputs (F, out).
         """
         scales, guided = self.scales[name], guides(name, self.chains, self.settings)
         found = []
@@ -147,8 +147,9 @@ class Networks:
         return found
 
     def frames(self, share: float) -> int:
-        """Return the number of frames to feed back when `share` of the training is done; 0: each network alone, one
-        frame from the truth.
+        """Return the number of frames to feed back when `share` of the training is done.
+
+        0: each network alone, one frame from the truth.
         """
         conditioned = self.settings.conditioned or self.settings.kind == SINGLE and self.config.rollout > 1
         return self.config.rollout if conditioned and share >= self.config.single_frames else 0

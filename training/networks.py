@@ -164,9 +164,7 @@ class _Arrays:
 
     @staticmethod
     def take(values, indices: np.ndarray, axis: int):
-        """Take values at fixed indices along an axis: runs of neighbours are sliced and joined, which jax compiles
-        faster.
-        """
+        """Take values at fixed indices along an axis: runs of neighbours are sliced and joined."""
         axis = axis % values.ndim
         indices = [int(index) for index in indices]
         starts = [i for i, index in enumerate(indices) if i == 0 or index != indices[i - 1] + 1]

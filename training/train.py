@@ -88,10 +88,9 @@ def train(
 
 
 def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
-    """Select at most `most` examples of the first one's subject (movements of one style blend better) with different
-    targets.
+    """Select at most `most` examples of the first one's subject with different targets.
 
-    The first, then always the one whose impact is farthest from those selected.
+    The first, then always the one whose impact is farthest from those selected. Movements of one style blend better.
     """
     examples = [example for example in examples if example.subject == examples[0].subject]
     places = np.array([(*example.impact, 10.0 * example.limb) for example in examples])
@@ -142,14 +141,15 @@ def least_astray(
     problem: Networks, held: Sequence[Example], model_of: Callable[[dict, str], ThrowModel],
     cancelled: Callable[[], bool] = lambda: False,
 ) -> float:
-    """Choose the ridge of `RIDGES` whose networks keep hands and feet nearest to their targets on held out
-    movements.
+    """Choose the ridge whose networks keep hands and feet nearest to their targets on held out movements.
 
     Args:
         problem: the training problem.
         held: examples that the regression does not use; if empty, the largest ridge is returned.
         build_model: function that builds a model from parameters and a line of text.
         cancelled: returns True to stop.
+    Returns:
+        One of `RIDGES`.
     """
     if not held:
         return RIDGES[-1]
@@ -199,9 +199,7 @@ def train_folder(options, told: Told) -> None:
 
 
 def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
-    """Read the folder's examples of the requested subjects, on one skeleton: the given one, otherwise the first
-    one's.
-    """
+    """Read the folder's examples of the requested subjects, on the given skeleton or the first one's."""
     skeleton = _skeleton(options.skeleton) if options.skeleton else None
     found = _read(options, config, told, skeleton)
     first = found[0].motion.skeleton

@@ -350,9 +350,7 @@ class _Search:
 
     @staticmethod
     def _least(hessian, pull, slopes, level, rows, free) -> np.ndarray:
-        """Solve rows (N, S): minimise u H u / 2 - pull u under slopes u = level, with only the entries `free`
-        variable.
-        """
+        """Solve rows (N, S) that minimise u H u / 2 - pull u under slopes u = level; only the entries `free` vary."""
         count, size, held = len(rows), len(free), slopes.shape[1]
         rest = rows.copy()
         rest[:, free] = 0.0

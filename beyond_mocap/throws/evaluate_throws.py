@@ -1,11 +1,11 @@
-"""Evaluate a trained model of throws or kicks on motions that it was not trained on (Fredriksson sections 4.5 and
-8.3).
+"""Evaluate a trained model of throws or kicks on motions that it was not trained on.
 
 `evaluate_throws(model, examples)` takes the description of each example, scaled by height to the model's body
 (section 4.5), generates the motion and compares: hands and feet with their targets (eq. 4.1), the ball's impact with
 its target, the head, smoothness, bone lengths, joint limits, computing time. The ball is held until the release and
 leaves with its position and velocity then, between two frames, computed from a spline of the body's rotations: from
 positions alone the velocity of a throwing hand, sampled 30 times per second, is a tenth too low.
+Source: Fredriksson sections 4.5 and 8.3.
 """
 
 from __future__ import annotations
@@ -118,9 +118,7 @@ class Evaluated:
         return np.array([one.impact for one in self.motions])
 
     def report(self) -> dict:
-        """Collect all figures, as `files.tables` writes them; means are over finite values of motions that did not
-        fail.
-        """
+        """Collect all figures, as `files.tables` writes them; means are over finite values of valid motions."""
         lost = find_lost(self.deviation)
         whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
         impact = self.impact[~lost]
@@ -225,8 +223,10 @@ def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, 
 
 
 def _head(motion: Motion, truth: Motion) -> tuple[float, float]:
-    """Measure the mean angle between the heads' rotations in degrees, and the head's rotation relative to the chest
-    divided by the true one; NaN for bodies without a head.
+    """Measure how the head's rotation differs from the true one; NaN for bodies without a head.
+
+    Returns:
+        Mean angle in degrees, and the head's total rotation relative to the chest divided by the true one.
     """
     turns, against = [], []
     for one in (motion, truth):
@@ -251,9 +251,7 @@ def _jerk(motion: Motion) -> float:
 
 
 def _bones(model: ThrowModel, made: Generated) -> float:
-    """Measure the largest change (m) of a bone's length: zero except for a single network, whose joints are
-    inconsistent.
-    """
+    """Measure the largest change (m) of a bone's length: zero unless a single network's joints are inconsistent."""
     if made.floating is None:
         return 0.0
     joints, parents = chains_of(model.skeleton).joints, model.skeleton.parents

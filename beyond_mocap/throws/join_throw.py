@@ -133,8 +133,10 @@ def join_throw(
 
 
 def hold_ends(own: Motion, start: float, first: int, end: int) -> tuple[Motion, float, int, int]:
-    """Extend a motion by holding its ends for as long as the throw requires; also return its start and the throw's
-    frames.
+    """Extend a motion to the length that the throw requires by holding its ends.
+
+    Returns:
+        The motion, s of its first frame, and first and end frame of the throw in it.
     """
     if first >= 0 and end <= len(own):
         return own, start, first, end
@@ -208,8 +210,9 @@ def _mean_speed(root: np.ndarray, stretch: tuple[int, int], fps: float) -> float
 
 
 def _old_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:
-    """Compute the weight (count,) of the surrounding motion: 0 within `kept`, 1 before the throw's first frame and
-    from its end.
+    """Compute the weight (count,) of the surrounding motion.
+
+    It is 0 within `kept`, 1 before the throw's first frame and from its end.
     """
     at = np.arange(count)
     before, behind = (kept[0] - at) / (kept[0] - first + 1.0), (at - kept[1] + 1) / (end - kept[1] + 1.0)
@@ -280,10 +283,9 @@ def transition_jerk(joined: JoinedThrow) -> np.ndarray:
 
 
 def library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
-    """Measure the jerk (m/s^3) that `percent` per cent of the library's uncut recordings do not exceed within 17
-    frames.
+    """Measure the jerk (m/s^3) that a share of the library's recordings does not exceed.
 
-    At `fps`; computed once per library.
+    `percent` of all windows of 17 frames of uncut recordings, at `fps`; computed once per library.
     """
     known = _usual.setdefault(library, {})
     if (fps, percent) not in known:

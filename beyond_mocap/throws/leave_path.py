@@ -194,9 +194,7 @@ def _speed_over(away: np.ndarray, frames: int, fps: float) -> float:
 
 
 def _easy_speed(own: Motion) -> float:
-    """Compute a speed (m/s) that is easy for a body, compared with its usual motion: its usual speed and a little
-    more.
-    """
+    """Compute a speed (m/s) that is easy for a body: its usual speed and a little more."""
     step = np.linalg.norm(np.diff(own.root_positions[:, :2], axis=0), axis=1) * own.fps
     usual = float(np.median(step)) if len(step) else 0.0
     return max(min(1.5 * usual, usual + 0.6), 1.6)

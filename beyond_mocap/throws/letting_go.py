@@ -123,9 +123,7 @@ class AtFoot:
                 int(frame) + 1 + int(after[0]) if len(after) else last)  # fmt: skip
 
     def rest(self, motion: Motion, frame: float, target: np.ndarray, ball: Ball) -> np.ndarray:
-        """Choose the initial position (3,) m of the ball: the given one, or in contact with the foot towards the
-        target.
-        """
+        """Choose the initial position (3,) m of the ball: the given one, or in contact with the foot."""
         if self.place is not None:
             return np.asarray(self.place, float)
         points, velocities = carried(self, motion, np.array([frame]))

@@ -88,8 +88,9 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
 
 
 def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
-    """Generate a kick of a subject at a random point of a goal 8 to 22 m away, slower ones often with the inside of
-    the foot.
+    """Generate a kick of a subject at a random point of a goal 8 to 22 m away.
+
+    Slower kicks are often with the inside of the foot.
     """
     for _ in range(_TRIES):
         target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
@@ -119,8 +120,10 @@ def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[flo
 
 
 def planted(action: str, seed: int, order: int) -> tuple[str, Planted]:
-    """Generate throw (or kick) number `order` of the subject of a seed, anywhere on the ground; also return the
-    subject's name.
+    """Generate throw (or kick) number `order` of the subject of a seed, anywhere on the ground.
+
+    Returns:
+        The subject's name, and the example.
     """
     make, person = ACTIONS[action]
     who, chance = person(seed), np.random.default_rng([seed, order, 40])
@@ -248,8 +251,9 @@ class _Aim:
         return np.stack([(_CLEAR - ends[:, 1, 2]) / (self.neutral.leg / LEG), lofts], axis=-1)
 
     def launches_of(self, ways: np.ndarray) -> np.ndarray:
-        """Compute the ball's position m, velocity m/s and spin rad/s (N, 9) for (lift, loft) pairs (N, 2), at the
-        style's own pace.
+        """Compute the ball's position m, velocity m/s and spin rad/s (N, 9) for (lift, loft) pairs (N, 2).
+
+        They are those of the style's own pace.
         """
         ends, velocities = contact(self.style, self.neutral, self.foot, ways)
         middle = velocities.mean(axis=1)
@@ -296,10 +300,10 @@ def _slopes(ends: np.ndarray) -> np.ndarray:
 
 
 def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarray:
-    """Compute the centre (3,) m of a ball on the ground in contact with the foot's line (2, 3) m moving with
-    `velocity` (3,).
+    """Compute the centre (3,) m of a ball on the ground that a foot touches.
 
-    A foot that points down strikes where its line is perpendicular to its velocity; a level one with its inside.
+    The foot's line (2, 3) m moves with `velocity` (3,) m/s. A foot that points down strikes where its line is
+    perpendicular to its velocity; a level one with its inside.
     """
     line = ends[1] - ends[0]
     along, far = line / np.linalg.norm(line), FOOT_RADIUS + radius

@@ -225,8 +225,9 @@ def _outside(span: Span, begin: float, finish: float) -> list[Span]:
 
 
 def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track:
-    """Lead the plan's track through the position of the throw while it lasts, with a detour at a feasible pace on
-    either side.
+    """Lead the plan's track through the position of the throw while it lasts.
+
+    Before and after it the track makes a detour at a feasible pace.
     """
     fps = plan.fps
     track = plan.sampled(fps)

@@ -308,9 +308,7 @@ class _Work:
     # Generating, and placing the motion where it is requested.
 
     def generated(self, plan: Planned) -> _Made:
-        """Generate the motion of a plan at its final position, at the requested frame rate and on the requested
-        skeleton.
-        """
+        """Generate the motion of a plan at its final position, with the requested frame rate and skeleton."""
         from .networks.frame_step import stepper
         from .networks.generate import generate
 

@@ -272,8 +272,9 @@ def _fastest(motion: Motion, release: float, action: Action) -> int:
 
 
 def _contact(motion: Motion, known: KnownThrow, action: Action) -> float:
-    """Find the second near the key moment at which the foot is fastest: derived key moments precede or follow the
-    contact.
+    """Find the second near the key moment at which the foot is fastest.
+
+    Derived key moments precede or follow the contact.
     """
     limb = _fastest(motion, known.release, action) if known.limb is None else known.limb
     seconds = known.release + np.linspace(-_LATE, _LATE, 13)

@@ -86,8 +86,9 @@ def is_known(path: Path, action: Action, words: Annotations, rows: list[KnownThr
 def read_known(
     path: Path, fps: float, action: Action, words: Annotations, rows: list[KnownThrow] | None
 ) -> list[KnownThrow]:
-    """Read what is recorded of each throw in a recording: from the table, then the report beside it, then its
-    annotations.
+    """Read what is recorded of each throw in a recording.
+
+    The table has priority over the report beside it, and that over its annotations.
     """
     annotated = list(_annotated(words, path, fps, action))
     measured = _measured(_report_of(path), action)

@@ -89,9 +89,7 @@ def _corrected(report: Mapping) -> bool:
 
 
 def _rows(report: Mapping) -> list[tuple[str, str]]:
-    """List titles of the compared motions and their keys; only one if nothing was corrected, since both are then
-    equal.
-    """
+    """List titles of the compared motions and their keys; only one if nothing was corrected."""
     alone = ("the networks alone", "network")
     return [alone, ("final motion", "deviation")] if _corrected(report) else [alone]
 

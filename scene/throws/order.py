@@ -186,8 +186,9 @@ def first_motion(ball: bpy.types.Object, wish: BeyondMocapThrow) -> int | None:
 
 
 def way_before(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarray) -> list[Matrix]:
-    """Compute the transforms of a ball on frames (F,) without this throw, in units, as if it were not carried by
-    others.
+    """Compute the transforms of a ball on frames (F,) without this throw, in units.
+
+    Frames on which others carry it are computed as if they did not.
     """
     curves, stance = _own_way(ball, wish)
     found, ends = possession.way_of(curves, stance, frames), channels.keyed_range(curves)
@@ -222,8 +223,9 @@ def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last:
 
 
 def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object | None:
-    """Find another armature whose preview uses this ball; deleted ones do not count, though the file may still
-    contain them.
+    """Find another armature whose preview uses this ball.
+
+    Deleted armatures do not count, though the file may still contain them.
     """
     return next(
         (one for one in bpy.data.objects if one.type == "ARMATURE" and one != body and one.beyond_mocap_throw.made
@@ -302,8 +304,9 @@ def _may_move(thing: bpy.types.Object) -> bool:
 
 
 def _resting(thing: bpy.types.Object) -> Matrix:
-    """Compute the transform of an object that nothing moves, since undo and loading clear the matrix_world of hidden
-    ones.
+    """Compute the transform of an object that nothing moves.
+
+    Undo and loading clear the matrix_world of hidden objects, so it cannot be used.
     """
     parent = thing.parent
     if parent is None:

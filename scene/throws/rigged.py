@@ -23,8 +23,10 @@ _own: dict[int, tuple["Motion | None", int]] = {}
 
 
 def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
-    """Find the driven bones of an armature that does not simply play its keys, else None; InputError if it cannot be
-    baked.
+    """Find the driven bones of an armature that does not simply play its keys, else None.
+
+    Raises:
+        InputError: if it cannot be baked.
     """
     wish = body.beyond_mocap_throw
     if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):

@@ -114,8 +114,9 @@ def _reset(wish) -> None:
 
 
 def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """Find an armature whose preview is not up to date; each request is started once, also if undo or redo restores
-    it.
+    """Find an armature whose preview is not up to date.
+
+    Each request is started once, also if undo or redo restores it.
     """
     asked = {}
     for body in scene.objects:

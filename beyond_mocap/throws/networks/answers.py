@@ -103,9 +103,7 @@ def _from_hips(chains: Chains, number: int) -> np.ndarray:
 
 
 def _reached(chains: Chains, joints: tuple[int, ...], turns, reference: int, goal: int, xp):
-    """Compute the position (..., 3) m of joint `goal` in the frame of `reference` from rotations (..., N, 3, 3) of
-    `joints`.
-    """
+    """Compute the position (..., 3) m of joint `goal` in the frame of `reference`; turns (..., N, 3, 3) of `joints`."""
     place, joint = chains.skeleton.offsets[goal], chains.skeleton.parents[goal]
     while joint != reference:
         if joint in joints:

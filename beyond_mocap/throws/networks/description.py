@@ -130,9 +130,7 @@ def places_at(description: Description, frames: np.ndarray) -> np.ndarray:
 
 
 def scaled(description: Description, ratio: float) -> Description:
-    """Scale a description to a body `ratio` times as large, with the target proportionally as far away (section
-    4.5).
-    """
+    """Scale a description to a body `ratio` times as large, and its target with it (section 4.5)."""
     larger = {
         name: None if getattr(description, name) is None else getattr(description, name) * ratio
         for name in ("effectors", "impact", "before", "after")

@@ -111,8 +111,9 @@ def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> 
 
 
 def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.ndarray]:
-    """List the frames of an example of `count` frames from second `first`, those known before it and those after it,
-    at `fps`, limited to what windows include.
+    """List the frames of an example, those known before it and those known after it, at `fps`.
+
+    The example has `count` frames from second `first`; the others are limited to what windows include.
     """
     last = int(np.floor((motion.duration - first) * fps + 1e-6))
     back = min(int(np.floor(first * fps + 1e-6)), int(np.ceil(BACK * STEP * fps)))

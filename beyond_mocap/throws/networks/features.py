@@ -106,8 +106,9 @@ def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windo
 
 
 def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
-    """Build (b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move, 25 in the thesis
-    (7.2).
+    """Build (b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move.
+
+    Source: Fredriksson section 7.2, where j = 25.
     """
     parts = _joints(chains, settings, pose, chains.joints, xp)
     moved = flat(picked(pose.moved, chains.joints, -2, xp), 2)
@@ -115,10 +116,9 @@ def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Wi
 
 
 def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
-    """Build (b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), j = 10 in the thesis, i =
-    8.
+    """Build (b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), i = 8.
 
-    Source: Fredriksson section 7.3.
+    Source: Fredriksson section 7.3, where j = 10.
     """
     frame = _Frame(chains.references["body"], pose, after, xp)
     seen = chains.body_sees
@@ -135,8 +135,7 @@ def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
 
 
 def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
-    """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 (left) or 1
-    (right).
+    """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 or 1.
 
     Source: Fredriksson section 7.3.
     """

@@ -1,8 +1,8 @@
-"""Predict one frame after another: network outputs, limited to the joints' ranges and moved towards the targets of
-hands and feet (Fredriksson section 7.7).
+"""Predict one frame after another, within the joints' limits and towards the targets of hands and feet.
 
 `HierarchyPredictor` evaluates a hierarchy with the same result as `features` and `network_output`, without free axes
 and jax, as fast as numpy allows; tests compare both.
+Source: Fredriksson section 7.7.
 """
 
 from __future__ import annotations
@@ -115,9 +115,7 @@ class Stepper:
         return pose._replace(positions=places)
 
     def _within_reach(self, after: Pose, wanted: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
-        """Reach with the limbs and limit the joints; where a limit changes a joint, the limbs reach again with what
-        is left.
-        """
+        """Reach with the limbs and limit the joints; reach again with the rest where a limit changed a joint."""
         after, over = self._limited(self.reach(after, wanted, share))
         if over.max() > _FELT:
             after, more = self._limited(self.reach(after, wanted, share))
@@ -163,8 +161,10 @@ def stillness(model: ThrowModel) -> tuple[int, ...]:
 
 @lru_cache(maxsize=8)
 def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """Compute the remaining share of an offset at a window's samples (9, 1), its change one frame later (9, 1), and
-    the remaining share in the next frame.
+    """Compute how an offset fades over a window.
+
+    Returns:
+        Remaining share at the samples (9, 1), its change one frame later (9, 1), and the share in the next frame.
     """
     seconds = (np.arange(SAMPLES) - BACK) * STEP
 
@@ -320,10 +320,9 @@ class OneFrame:
 
 
 def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
-    """Update the joints of a plan (joint, parent, offset), parents first, in `after` itself from its local
-    rotations.
+    """Update the joints of a plan (joint, parent, offset), parents first, in `after` itself.
 
-    `given` contains world rotations, which replace the local ones.
+    Local rotations are those of `after`; `given` contains world rotations, which replace them.
     """
     local, places, turns = after.local, after.positions, after.turns
     for joint, parent, offset in plan:

@@ -204,9 +204,7 @@ def _check(model: ThrowModel, description: Description) -> None:
 
 
 def _check_numbers(step: Step, frame: int) -> None:
-    """Raise InputError if the body is invalid, as networks may return NaN or huge values far from their training
-    data.
-    """
+    """Raise InputError if the body is invalid: networks may return NaN or huge values far from their training data."""
     if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
         raise InputError("model", f"an invalid body in frame {frame}", "a body near its description",
                          "choose a target like those of the examples, or train the model longer")  # fmt: skip
@@ -300,10 +298,9 @@ def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb:
 
 
 def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.ndarray) -> Pose:
-    """Place the pose of an example's frame, rotated by `turn` rad, so that its effectors lie about `places` (4, 3)
-    m.
+    """Place the pose of an example's frame so that its effectors lie about `places` (4, 3) m.
 
-    Its joints have the velocities of the example.
+    It is rotated by `turn` rad about the vertical; its joints have the velocities of the example.
     """
     motion = model.examples[example].motion
     both = slice(max(frame - 1, 0), frame + 1)
@@ -319,7 +316,8 @@ def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.
 
 
 def start_pose(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> Pose:
-    """Choose the pose of the examples that best begins a movement, and place it; arguments as of
-    `find_nearest_frame`.
+    """Choose and place the pose of the examples that best begins a movement.
+
+    Arguments as of `find_nearest_frame`.
     """
     return placed(model, *nearest(model, places, velocities, limb), places)

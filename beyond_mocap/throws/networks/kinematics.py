@@ -83,9 +83,7 @@ def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def pose_of(skeleton: Skeleton, root, local, xp=np) -> Pose:
-    """Build the state of a body from its root position (..., 3) m and local rotations (..., J, 3, 3), without
-    motion.
-    """
+    """Build the state of a body without motion from its root (..., 3) m and local rotations (..., J, 3, 3)."""
     positions, turns = places_and_turns(skeleton.offsets, skeleton.parents, root, local, xp)
     return Pose(root, local, positions, turns, xp.zeros_like(positions))
 

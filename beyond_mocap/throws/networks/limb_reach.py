@@ -108,9 +108,7 @@ class LimbReach:
         return posed(self.chains, root, self._bent(pose.local, places, turns, end, target))
 
     def all_the_way(self, pose: Pose, wanted: np.ndarray) -> np.ndarray:
-        """Compute local rotations (J, 3, 3) that bring the effectors to `requested` (4, 3) m, or as near as the
-        limbs reach.
-        """
+        """Compute local rotations (J, 3, 3) that bring the effectors as near to `requested` (4, 3) m as possible."""
         tip, end = pose.positions[self._tip], pose.positions[self._end]
         return self._bent(pose.local, pose.positions, pose.turns, end, wanted - (tip - end))
 
@@ -157,9 +155,7 @@ class LimbReach:
 
 
 def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
-    """Build the pose with local rotations (J, 3, 3) and the root at (3,) m; its joint displacements are unknown
-    (zero).
-    """
+    """Build a pose from local rotations (J, 3, 3) and a root at (3,) m; its joint displacements are zero."""
     places, turns = one_pose(chains.skeleton.offsets, chains.skeleton.parents, root, local)
     return Pose(root, local, places, turns, np.zeros_like(places))
 
@@ -180,8 +176,7 @@ def _between(chains: Chains, high: int, low: int) -> list[int]:
 
 
 def toward(predicted, wanted, share):
-    """Interpolate the point (..., 3) m to reach, at `share` of the distance from the predicted to the requested
-    point.
+    """Interpolate the point (..., 3) m to reach, at `share` from the predicted to the requested point.
 
     A linearly interpolated point avoids over-correction of the joints.
     Source: Fredriksson section 7.7.3.

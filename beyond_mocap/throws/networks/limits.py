@@ -137,8 +137,9 @@ class JointLimits:
         self._axes = np.array(axes).reshape(-1, 2, 3)
 
     def of_joints(self, joints: Sequence[int]) -> JointLimits:
-        """Return the limits of the given joints only; arrays passed to the result then have just these joints, in
-        this order.
+        """Return the limits of the given joints only.
+
+        Arrays passed to the result have just these joints, in this order.
         """
         joints, part = list(joints), copy(self)
         part.middle, part._back, part.low, part.high = (
@@ -159,8 +160,7 @@ class JointLimits:
         return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
 
     def _other_way_round(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """Replace long offsets (..., J, 3) by the equivalent vector with the other sign where that is nearer to the
-        range.
+        """Replace long offsets (..., J, 3) by their equivalent of opposite sign where that is nearer to the range.
 
         Beyond half a revolution the short vector flips to the opposite side.
         """
@@ -212,9 +212,7 @@ class JointLimits:
         return local, over
 
     def _forward(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
-        """Rotate hinges about their bending axes by the excess `back` (..., H) rad; also return the joints' total
-        excess.
-        """
+        """Rotate hinges about their bending axes by the excess `back` (..., H) rad; also return the total excess."""
         local, over = local.copy(), over.copy()
         for number, hinge in enumerate(self.hinges):
             turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
@@ -223,9 +221,7 @@ class JointLimits:
         return local, over
 
     def bends(self, local: np.ndarray) -> np.ndarray:
-        """Measure the bend (..., H) rad of each hinge in local rotations (..., J, 3, 3): 0 straight, negative
-        backwards.
-        """
+        """Measure the bend (..., H) rad of each hinge in local rotations (..., J, 3, 3): negative is backwards."""
         bones = local[..., self._joints, :, :] @ self._bones
         shares = self._axes @ bones
         return arctan2(shares[..., 0, 0], shares[..., 1, 0])
@@ -307,8 +303,9 @@ class LimbLimits:
         )
 
     def held(self, rotations: np.ndarray, given: np.ndarray) -> np.ndarray:
-        """Limit local rotations (W, C, 4) of the limb's joints; where `permitted` (W, C, 4) exceeds the limits, it
-        is the limit.
+        """Limit local rotations (W, C, 4) of the limb's joints.
+
+        Where `permitted` (W, C, 4) exceeds the limits, it is the limit.
         """
         local, over = self.limits.within(self._carried(rotations), self._carried(given))
         if not over.any():

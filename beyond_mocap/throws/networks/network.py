@@ -115,8 +115,9 @@ class PhaseNetwork:
         return sum(one.size for one in (*self.weights, *self.biases))
 
     def predict(self, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
-        """Compute outputs (..., out) for inputs (..., in) at phases (...) of 0 .. 1, in the precision of weights and
-        inputs.
+        """Compute outputs (..., out) for inputs (..., in) at phases (...) of 0 .. 1.
+
+        The precision is that of weights and inputs.
         """
         theta = weigh_points(phase, self.points)
         normal = (x - self.input_mean) / self.input_scale

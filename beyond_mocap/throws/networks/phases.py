@@ -47,9 +47,7 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
 
 
 def _pinned(at: np.ndarray, gone: np.ndarray, release: float) -> np.ndarray:
-    """Compute phases from an increasing quantity (T,) at frames `at` (T,): 0 at the start, c at the release, 1 at
-    the end.
-    """
+    """Compute phases from an increasing quantity (T,): 0 at the start, c at the release, 1 at the end."""
     then = np.interp(release, at, gone)
     before = _part(gone, gone[0], then, at=at, first=at[0], last=release)
     after = _part(gone, then, gone[-1], at=at, first=release, last=at[-1])

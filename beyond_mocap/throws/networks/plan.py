@@ -146,9 +146,7 @@ def _blended(examples: list[Example], weights: np.ndarray, pace: float, wish: Wi
 
 
 def _in_step(example: Example) -> np.ndarray:
-    """Compute the progress (T,) of an example from 0 to 1, strictly increasing: the phase of its limb mixed with
-    time.
-    """
+    """Compute the progress (T,) of an example from 0 to 1, increasing: the phase of its limb mixed with time."""
     joint = chains_of(example.motion.skeleton).effectors[example.limb]
     places, _ = pose_kinematics(example.motion.skeleton, example.motion.root_positions, example.motion.rotations)
     last = len(example.motion) - 1

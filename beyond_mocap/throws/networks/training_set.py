@@ -70,9 +70,7 @@ def shared_chains(examples: Sequence[Example]) -> Chains:
 
 
 def leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
-    """Measure the shortest and longest distance, metres, from the top of each leg to its toe (eq. 7.3) in the
-    examples.
-    """
+    """Measure the shortest and longest distance, metres, from the top of each leg to its toe (eq. 7.3)."""
     chains = shared_chains(examples)
     whole = joined([steps(example) for example in examples])
     found = {}
