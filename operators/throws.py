@@ -11,13 +11,13 @@ from .verb import BackgroundVerb, Verb
 
 
 class AtTarget(BackgroundVerb):
-    """What throwing and kicking share."""
+    """Base of throwing and kicking."""
 
     act = ""
     needs = "Select the armature that throws or kicks", lambda context: thrower(context) is not None
 
     def order(self, context):
-        """Who, from where, at what, when."""
+        """Build the request from the scene."""
         return order.order_of(context.scene, thrower(context), self.act)
 
     work = staticmethod(made.work)
@@ -25,8 +25,8 @@ class AtTarget(BackgroundVerb):
     def apply(self, scene, result):
         body = scene.objects.get(result.order.body)
         if body is None or body.type != "ARMATURE":
-            raise InputError(f"armature {result.order.body}", "it is gone meanwhile", "the same armature",
-                             "press again")
+            raise InputError(f"armature {result.order.body}", "it was removed meanwhile", "the same armature",
+                             "select an armature and try again")
         shown.show(scene, body, result)
         for line in body.beyond_mocap_throw.told.splitlines():
             self.report({"WARNING"}, f"{body.name}: {line}")
@@ -34,8 +34,8 @@ class AtTarget(BackgroundVerb):
 
 
 class BEYOND_MOCAP_OT_throw_at_target(AtTarget, bpy.types.Operator):
-    """Let the selected armature throw a ball that hits the target: a network makes the throw, and wrist and release are
-changed as little as it takes. Without a target the 3D cursor is aimed at. Press it again for another target"""
+    """Throw a ball at the target with the selected armature: networks generate the throw, and wrist and release are
+changed only as much as needed. Without a target the 3D cursor is used"""
 
     bl_idname = "beyond_mocap.throw_at_target"
     bl_label = "Throw at Target"
@@ -44,37 +44,37 @@ changed as little as it takes. Without a target the 3D cursor is aimed at. Press
 
 
 class ThrownVerb(Verb):
-    """A verb about the throw or kick that is shown."""
+    """Base of operators on the throw or kick in preview."""
 
-    needs = ("Select an armature that throws or kicks",
+    needs = ("Select an armature with a throw or kick in preview",
              lambda context: (body := thrower(context)) is not None and bool(body.beyond_mocap_throw.made))
 
 
 class BEYOND_MOCAP_OT_leave_throw(ThrownVerb, bpy.types.Operator):
-    """Take the throw or kick away: armature and ball play what they did before"""
+    """Revert the throw or kick: armature and ball play what they did before"""
 
     bl_idname = "beyond_mocap.leave_throw"
-    bl_label = "Leave Throw"
+    bl_label = "Revert Throw"
 
     def do(self, context):
-        """Bring back what was there."""
+        """Restore the earlier animation."""
         shown.leave(context.scene, thrower(context))
 
 
 class BEYOND_MOCAP_OT_keep_throw(ThrownVerb, bpy.types.Operator):
-    """Keep the throw or kick: it is the armature's own motion from now on, and the next one begins from it"""
+    """Apply the throw or kick: it becomes the armature's own motion, and the next one begins from it"""
 
     bl_idname = "beyond_mocap.keep_throw"
-    bl_label = "Keep Throw"
+    bl_label = "Apply Throw"
 
     def do(self, context):
-        """Nothing of before is kept."""
+        """Apply the preview."""
         shown.keep(thrower(context))
 
 
 class BEYOND_MOCAP_OT_kick_at_target(AtTarget, bpy.types.Operator):
-    """Let the selected armature kick a ball that hits the target: where it lies, if one is chosen, else in front of the
-foot. Without a target the 3D cursor is aimed at. Press it again for another target"""
+    """Kick a ball at the target with the selected armature: from where it is if one is chosen, else in front of the
+foot. Without a target the 3D cursor is used"""
 
     bl_idname = "beyond_mocap.kick_at_target"
     bl_label = "Kick at Target"

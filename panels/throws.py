@@ -1,4 +1,4 @@
-"""Throws & Kicks: an armature throws or kicks a ball so that it hits a target."""
+"""Throws & Kicks: an armature throws or kicks a ball at a target."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from .tab import Step, paragraph, section, split, table
 
 
 class BEYOND_MOCAP_PT_throws(Step, bpy.types.Panel):
-    """Who throws at what, when, and what came of it."""
+    """Settings, preview and figures of a throw or kick."""
 
     bl_label = "Throws & Kicks"
     bl_order = 9
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """The armature that is meant, its wishes, the two buttons, the figures."""
+        """Draw the armature, its settings, the two buttons and the figures."""
         layout, body = self.layout, thrower(context)
         if body is None:
             paragraph(layout, "Select the armature that throws or kicks", "INFO")
@@ -28,7 +28,7 @@ class BEYOND_MOCAP_PT_throws(Step, bpy.types.Panel):
         for name in ("target", "frame", "speed", "ball", "kind", "library"):
             column.prop(wish, name)
         if wish.target is None:
-            paragraph(layout, "Without a target the 3D cursor is aimed at", "CURSOR")
+            paragraph(layout, "Without a target the 3D cursor is used", "CURSOR")
         row = layout.row(align=True)
         row.scale_y = 1.3
         row.operator("beyond_mocap.throw_at_target", text="Throw", icon="VIEW_PAN")
@@ -40,7 +40,7 @@ class BEYOND_MOCAP_PT_throws(Step, bpy.types.Panel):
 
 
 def shown(layout, wish) -> None:
-    """The figures of the throw that is shown, and what may become of it."""
+    """Draw the figures of the preview, and the buttons to apply or revert it."""
     if not wish.made:
         return
     table(layout, wish.figures.splitlines())
@@ -48,12 +48,12 @@ def shown(layout, wish) -> None:
         paragraph(layout, line, "INFO")
     layout.prop(wish, "live")
     row = layout.row(align=True)
-    row.operator("beyond_mocap.keep_throw", text="Keep", icon="CHECKMARK")
-    row.operator("beyond_mocap.leave_throw", text="Leave", icon="X")
+    row.operator("beyond_mocap.keep_throw", text="Apply", icon="CHECKMARK")
+    row.operator("beyond_mocap.leave_throw", text="Revert", icon="X")
 
 
 def models(layout, wish) -> None:
-    """Which networks make it."""
+    """Draw the choice of networks."""
     column = split(layout)
     for name in ("throw_model", "kick_model", "seed"):
         column.prop(wish, name)

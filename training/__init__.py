@@ -1,14 +1,14 @@
-"""Training of the networks behind throws and kicks; see docs/throws/throws-training.md.
+"""Training of the networks for throws and kicks; see docs/throws/throws-training.md.
 
-Not part of the extension: it needs jax and optax (`make training`). What it makes is a file of weights that
+Not part of the extension: it needs jax and optax (`make training`). It writes a file of weights that
 `beyond_mocap.throws.networks` uses with numpy alone.
 """
 
 import os
 import pathlib
 
-if (os.cpu_count() or 1) <= 4:  # threads that wait for each other cost more than they bring
+if (os.cpu_count() or 1) <= 4:  # on few cores, waiting threads cost more time than they save
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
-# Compiling takes longer than a small training: what was compiled once is kept.
+# Compiling takes longer than a small training, so compiled code is cached.
 _KEPT = pathlib.Path(os.environ.get("XDG_CACHE_HOME", pathlib.Path.home() / ".cache")) / "beyond-mocap" / "compiled"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(_KEPT))

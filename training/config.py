@@ -1,5 +1,7 @@
-"""What a training is told: the sizes of the networks and how they are trained; read from a small JSON
-(docs/throws/throws-training.md has a table of all names)."""
+"""Configuration of a training, read from a small JSON file.
+
+docs/throws/throws-training.md has a table of all names.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ from beyond_mocap.throws.networks.model import ModelSettings
 
 PAGE = "docs/throws/throws-training.md"
 LARGEST = 1_000_000
-"""Bytes of a file above which it is no config."""
+"""Largest size of a config file, bytes."""
 LIMITS = {
     "epochs": (0, 1_000_000), "macro": (1, 10_000), "batch": (1, 65_536), "learning_rate": (1e-7, 1.0),
     "final_rate": (0.0, 1.0), "keep": (0.05, 1.0), "l1": (0.0, 10.0), "limb_weight": (0.0, 1000.0),
@@ -25,20 +27,33 @@ LIMITS = {
 
 @dataclass(frozen=True)
 class TrainingConfig:
-    """How networks are trained; the defaults are those of the shipped weights.
+    """How networks are trained; the defaults are those of the weights that are part of the project.
 
-    settings: what the model is. epochs: times through all frames. macro: epochs between two checkpoints (§7.6). batch:
-    frames a step. learning_rate: Adam's at the start; it falls along a cosine to final_rate times that. keep: share of
-    the values that dropout keeps, in single, hip and body (§7.6). l1: lambda 1 of eq. 7.5, on the mean of the weights'
-    sizes. limb_weight, body_weight: lambda 2 of eq. 7.5, per metre, for arms and legs and for hip and body.
-    effector_loss: whether lambda 2 counts at all. single_effector: whether it does for the single network too (§9.2).
-    rollout: frames that are fed back before the loss is counted; 1 is one frame from the truth, as in §7.5.
-    single_frames: share of the training that goes by single frames before that. noise: radians by which the pose at the
-    start of a stretch is off. mirrored: whether each example is also taken mirrored.
-    linear_start: whether networks start from what linear regression says, else at random. ridge: of that regression, a
-    row; 0: chosen on examples that are left out for it. start_noise: radians by which joints are off in a copy of all
-    frames that regression sees too (`disturbed`); 0: none. examples: most that the model keeps to start from (§7.7.1).
-    seed: of first weights, order, dropout and noise."""
+    Attributes:
+        settings: settings of the model.
+        epochs: passes through all frames.
+        macro: epochs between two checkpoints (section 7.6).
+        batch: frames per step.
+        learning_rate: Adam's learning rate at the start.
+        final_rate: share of it at the end; it falls along a cosine.
+        keep: share of values that dropout keeps, in single, hip and body (section 7.6).
+        l1: lambda 1 of eq. 7.5, on the mean absolute weight.
+        limb_weight: lambda 2 of eq. 7.5, per metre, for arms and legs.
+        body_weight: lambda 2 of eq. 7.5, per metre, for hip and body.
+        effector_loss: whether lambda 2 is used at all.
+        single_effector: whether it is used for the single network too (section 9.2).
+        rollout: frames that are fed back before the loss is computed; 1 is one frame from the truth, as in section
+            7.5.
+        single_frames: share of the training with single frames before that.
+        noise: rad, error of the pose at the start of a stretch.
+        mirrored: also use the mirror image of each example.
+        linear_start: networks start from linear regression, otherwise at random.
+        ridge: ridge of that regression, per row; 0: chosen on examples that are held out.
+        start_noise: rad, error of the joints in a copy of all frames that the regression also uses
+            (`disturb_poses`); 0: none.
+        examples: largest number of examples that the model contains for start poses (section 7.7.1).
+        seed: of first weights, order, dropout and noise.
+    """
 
     settings: ModelSettings = field(
         default_factory=lambda: ModelSettings(units=96, conditioned=True, guided=True, carried=True)
@@ -70,16 +85,20 @@ class TrainingConfig:
                 raise InputError(f"training: {name}", f"{getattr(self, name)}", f"{low} to {high}", f"see {PAGE}")
 
     def flat(self) -> dict:
-        """All names of the JSON with their values."""
+        """Return all names of the JSON with their values."""
         own = {name: value for name, value in asdict(self).items() if name != "settings"}
         return {**asdict(self.settings), **own}
 
 
 def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
-    """The training that a JSON file describes, what it leaves out by default; without a file the default.
+    """Read a training from a JSON file; names that it lacks, and a missing file, mean the defaults.
 
-    changes: values that stand above the file's, None where there is none. InputError, one line: no such file, no JSON,
-    an unknown name, a value out of its range."""
+    Args:
+        path: the file, or None.
+        changes: values that replace the file's; None means no change.
+    Raises:
+        InputError: one line: no such file, no JSON, an unknown name, a value out of its range.
+    """
     told = {}
     if path is not None:
         told = values.object_of(utf8(Path(path), "a training's config", LARGEST), str(path), PAGE)
@@ -89,7 +108,7 @@ def read_config(path: str | os.PathLike | None, **changes) -> TrainingConfig:
 
 
 def config_of(told: dict, where: object = "config") -> TrainingConfig:
-    """The training that names and values describe. InputError as for `read_config`."""
+    """Build a training from names and values; InputError as for `read_config`."""
     known = TrainingConfig().flat()
     values.check_names(told, str(where), known, ())
     read = {name: _value(value, known[name], f"{where}: {name}") for name, value in told.items()}
@@ -98,12 +117,12 @@ def config_of(told: dict, where: object = "config") -> TrainingConfig:
     try:
         settings = replace(start.settings, **{name: value for name, value in read.items() if name in of_model})
         return replace(start, settings=settings, **{name: read[name] for name in read if name not in of_model})
-    except InputError as error:  # which does not know whose values they are
+    except InputError as error:  # its text does not name the file
         raise InputError(where, str(error)) from None
 
 
 def _value(value, default, where: str):
-    """A value of the kind that the default has."""
+    """Parse a value of the same type as the default."""
     if isinstance(default, bool):
         return values.truth(value, where)
     if isinstance(default, int):

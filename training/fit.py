@@ -1,8 +1,8 @@
-"""Adam on any problem: epochs, macro-epochs with a checkpoint, a falling learning rate, a limit of time.
+"""Train any problem with Adam: epochs, macro-epochs with a checkpoint, a falling learning rate, a time limit.
 
-The same seed gives the same bits on one machine, broken off and resumed or not; with a limit of time the result depends
-on how fast the machine is. A training that was broken off goes on where its last checkpoint was written: parameters,
-the optimizer's state and how far it was, in one file beside the weights, written whole or not at all.
+The same seed gives the same bits on one machine, also if interrupted and resumed; with a time limit the result
+depends on the speed of the machine. An interrupted training continues from its last checkpoint: parameters, the
+optimizer's state and the progress, in one file beside the weights, written completely or not at all.
 """
 
 from __future__ import annotations
@@ -29,19 +29,26 @@ from beyond_mocap.files.whole import beside
 from .config import TrainingConfig
 
 CLIP = 1.0
-"""Longest gradient that is followed; a frame fed back many times can make a long one."""
+"""Largest norm of a gradient; feeding a frame back many times can cause large ones."""
 VERSION = 1
-NEXT_STEP = "give the same command again, or leave --resume out to begin anew"
+NEXT_STEP = "repeat the same command, or leave --resume out to start again"
 
 
-# In which order a training sees its examples: stretches of some frames, shuffled again in each epoch.
+# Order of the examples: stretches of some frames, shuffled again in each epoch.
 
 
 def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
-    """Stretches (N, 2) of `frames` steps, (example, first frame), shuffled.
+    """List stretches (N, 2) of `frames` steps, (example, first frame), shuffled.
 
-    lengths: frames of each example. Stretches lie end to end from a random frame on, so that within an epoch nearly
-    every frame is predicted once; examples too short for one are left out. Seed and epoch alone decide."""
+    Stretches are adjacent from a random frame on, so that within an epoch nearly every frame is predicted once;
+    examples too short for one are left out. The result depends on seed and epoch only.
+
+    Args:
+        lengths: frames of each example.
+        frames: steps of a stretch.
+        seed: of the training.
+        epoch: number of the epoch.
+    """
     rng = np.random.default_rng([seed, epoch])
     rows = []
     for example, length in enumerate(lengths):
@@ -56,33 +63,45 @@ def stretches(lengths, frames: int, seed: int, epoch: int) -> np.ndarray:
 
 
 def batches(rows: np.ndarray, size: int) -> np.ndarray:
-    """Rows (N, ...) as whole batches (B, size, ...); the last is filled up from the beginning."""
+    """Split rows (N, ...) into equal batches (B, size, ...); the last is filled up from the beginning."""
     count = max(1, -(-len(rows) // size))
     return rows[np.arange(count * size) % len(rows)].reshape(count, size, *rows.shape[1:])
 
 
 class Problem(Protocol):
-    """What is trained. lengths: frames of each example. fits: settings and recordings as one text. data: a tree of
-    arrays that the loss is given."""
+    """A training problem.
+
+    Attributes:
+        lengths: frames of each example.
+        fits: settings and recordings as one text to compare.
+        data: tree of arrays that the loss receives.
+    """
 
     lengths: Sequence[int]
     fits: str
     data: object
 
     def first(self, key) -> dict:
-        """The parameters to begin with."""
+        """Build the first parameters."""
 
     def frames(self, share: float) -> int:
-        """Frames that are fed back when `share` of the training is done; 0: none, single frames."""
+        """Return the number of frames to feed back when `share` of the training is done; 0: single frames."""
 
     def loss(self, params, data, rows, key, frames: int):
-        """The loss (), and its parts by name, of stretches rows (B, 2) of so many frames."""
+        """Compute the loss (), and its parts by name, of stretches rows (B, 2) of that many frames."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trained:
-    """params: as the problem has them. epochs: done. seconds: spent. losses: of each epoch. parts: of the last epoch,
-    by name."""
+    """Result of a training.
+
+    Attributes:
+        params: parameters, as the problem defines them.
+        epochs: number of epochs.
+        seconds: computing time.
+        losses: mean loss of each epoch.
+        parts: parts of the loss in the last epoch, by name.
+    """
 
     params: dict
     epochs: int
@@ -96,10 +115,20 @@ def fit(
     minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> Trained:
-    """Trains a problem. checkpoint: where one is written after each macro-epoch and when cancelled. resume: from there.
+    """Train a problem.
 
-    InputError where no example is long enough, where the checkpoint is of another training, or where the loss is no
-    number any more; Cancelled when asked to stop."""
+    Args:
+        problem: the problem.
+        config: configuration of the training.
+        checkpoint: file to write after each macro-epoch and when cancelled, or None.
+        resume: continue from the checkpoint.
+        minutes: time limit, or None.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    Raises:
+        InputError: if no example is long enough, the checkpoint is of another training, or the loss is not finite.
+        Cancelled: if `cancelled` returns True.
+    """
     adam = optax.chain(_clipped(), optax.scale_by_adam())
     params = problem.first(jax.random.key(config.seed))
     state = (params, adam.init(params))
@@ -119,11 +148,11 @@ def fit(
         progress(share, f"epoch {epoch + 1}, loss {losses[-1]:.4f}" if losses else "compiling")
         if cancelled():
             keep()
-            raise Cancelled(f"cancelled after {epoch} epochs" + ("; --resume goes on" if checkpoint else ""))
+            raise Cancelled(f"cancelled after {epoch} epochs" + ("; --resume continues" if checkpoint else ""))
         state, parts = _epoch(problem, config, steps, state, epoch, problem.frames(share), rate_at(share, config))
         losses, epoch = (*losses, parts["loss"]), epoch + 1
         if not np.isfinite(losses[-1]):
-            raise InputError("training", f"the loss is no number after {epoch} epochs", "a lower learning_rate")
+            raise InputError("training", f"the loss is not finite after {epoch} epochs", "a lower learning_rate")
         if epoch % config.macro == 0:
             keep()
     keep()
@@ -131,21 +160,25 @@ def fit(
 
 
 def rate_at(share: float, config: TrainingConfig) -> float:
-    """Adam's rate when `share` of the training is done: along half a cosine from learning_rate to final_rate of it,
-    after a short rise."""
+    """Compute Adam's rate when `share` of the training is done.
+
+    It follows half a cosine from learning_rate to final_rate times that, after a short rise.
+    """
     falling = config.final_rate + (1.0 - config.final_rate) * 0.5 * (1.0 + np.cos(np.pi * share))
     return config.learning_rate * falling * min(1.0, 0.1 + share / 0.01)
 
 
 def _share(epoch: int, seconds: float, config: TrainingConfig, minutes: float | None) -> float:
-    """How much of the training is done, by epochs or by time, whichever is further."""
+    """Compute the share of the training that is done, by epochs or by time, whichever is larger."""
     done = epoch / config.epochs if config.epochs else 1.0
     return max(done, 0.0 if minutes is None else seconds / (60.0 * minutes))
 
 
 def _clipped() -> optax.GradientTransformation:
-    """Gradients no longer than CLIP, each network's by itself, so that networks trained alone do not know each
-    other."""
+    """Build a transformation that clips the gradient of each network separately to MAX_GRADIENT.
+
+    Separately trained networks stay independent that way.
+    """
 
     def update(updates, state, params=None):
         clip = optax.clip_by_global_norm(CLIP).update
@@ -155,7 +188,7 @@ def _clipped() -> optax.GradientTransformation:
 
 
 def _steps(problem: Problem, adam):
-    """The compiled step, one for each number of frames."""
+    """Build the compiled step, one for each number of frames."""
 
     @partial(jax.jit, static_argnames="frames", donate_argnums=0)
     def step(state, data, rows, key, rate, frames: int):
@@ -169,7 +202,7 @@ def _steps(problem: Problem, adam):
 
 
 def _epoch(problem, config, step, state, epoch, frames, rate):
-    """Once through all examples: the new state, and the mean of the losses."""
+    """Train one epoch: the new state, and the mean of the losses."""
     length = max(1, frames)
     rows = stretches(problem.lengths, length, config.seed, epoch)
     if not len(rows):
@@ -186,8 +219,15 @@ def _epoch(problem, config, step, state, epoch, frames, rate):
 
 @dataclass(frozen=True, eq=False)
 class Checkpoint:
-    """How far a training is. state: parameters and optimizer's state, a tree of arrays. epoch: epochs done. seconds:
-    time spent. losses: (E,) mean loss of each epoch. fits: what it was trained on and how, as one text to compare."""
+    """State of a training.
+
+    Attributes:
+        state: parameters and optimizer's state, a tree of arrays.
+        epoch: number of epochs done.
+        seconds: computing time so far.
+        losses: (E,) mean loss of each epoch.
+        fits: settings and recordings as one text to compare.
+    """
 
     state: object
     epoch: int
@@ -197,19 +237,19 @@ class Checkpoint:
 
 
 def checkpoint_path(out: str | os.PathLike) -> Path:
-    """Where the checkpoint of the weights at `out` stands."""
+    """Return the path of the checkpoint of the weights at `out`."""
     out = Path(out)
     return out.with_name(f"{out.stem}.checkpoint.npz")
 
 
 def check_checkpoint(path: Path) -> None:
-    """InputError where there is no checkpoint to go on from."""
+    """Raise InputError if there is no checkpoint."""
     if not path.is_file():
-        raise InputError(path, "no checkpoint there", "one, for --resume", "leave --resume out to begin anew")
+        raise InputError(path, "no such file", "a checkpoint for --resume", "leave --resume out to start again")
 
 
 def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
-    """Writes it whole. InputError where the folder cannot be written."""
+    """Write a checkpoint completely or not at all; InputError if the folder cannot be written."""
     leaves = [np.asarray(leaf) for leaf in jax.tree.leaves(checkpoint.state)]
     told = {"version": VERSION, "epoch": checkpoint.epoch, "seconds": checkpoint.seconds, "fits": checkpoint.fits}
     with beside(path, ".npz") as part:
@@ -218,9 +258,16 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
 
 
 def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
-    """The checkpoint at `path`, whose state has the form of the tree `like`.
+    """Read a checkpoint, whose state has the structure of the tree `like`.
 
-    InputError, one line: missing, damaged, of another version, or of a training with other settings or recordings."""
+    Args:
+        path: the file.
+        like: tree of arrays with the expected structure.
+        fits: text of the present settings and recordings.
+    Raises:
+        InputError: one line: missing, damaged, of another version, or of a training with other settings or
+            recordings.
+    """
     check_checkpoint(path)
     try:
         with np.load(path, allow_pickle=False) as file:
@@ -230,11 +277,11 @@ def read_checkpoint(path: Path, like: object, fits: str) -> Checkpoint:
         version, epoch, seconds, trained = (told[name] for name in ("version", "epoch", "seconds", "fits"))
     except (ValueError, KeyError, TypeError, EOFError, OSError, zipfile.BadZipFile, zlib.error,
             NotImplementedError, RuntimeError, AttributeError) as error:
-        raise InputError(path, f"is no checkpoint that can be read ({type(error).__name__})", "", NEXT_STEP) from None
+        raise InputError(path, f"is not a readable checkpoint ({type(error).__name__})", "", NEXT_STEP) from None
     if version != VERSION:
         raise InputError(path, f"version {version}", f"version {VERSION}", NEXT_STEP)
     wanted, tree = jax.tree.flatten(like)
     if trained != fits or [(a.shape, a.dtype) for a in leaves] != [(b.shape, b.dtype) for b in map(np.asarray, wanted)]:
-        raise InputError(path, "of a training with other settings or recordings", "", NEXT_STEP)
+        raise InputError(path, "belongs to a training with other settings or recordings", "", NEXT_STEP)
     state = jax.tree.unflatten(tree, [jnp.asarray(leaf) for leaf in leaves])
     return Checkpoint(state, int(epoch), float(seconds), losses, fits)

@@ -1,5 +1,8 @@
-"""The networks of a model trained on recordings, in the three ways there are: each alone on the truth (§7.5, §7.6), in
-order, so that children see what their parents predict (§9.4), and with several frames fed back as in use."""
+"""Train the networks of a model on recordings in three ways.
+
+Each alone on the truth (sections 7.5 and 7.6), in order, so that child networks receive the output of their parents
+(section 9.4), and with several frames fed back as in use.
+"""
 
 from __future__ import annotations
 
@@ -26,28 +29,28 @@ from .networks import ARRAYS, RIDGES, Linear, Sums, first_weights, linear_start,
 from .recordings import Recordings, disturbed, drawn, single_steps, step_arrays
 
 DROPPED = (SINGLE, "hip", "body")
-"""Networks that are trained with dropout (§7.6)."""
+"""Networks that are trained with dropout (section 7.6)."""
 ROOT_NOISE = 0.3
-"""Metres by which the root is off at the start of a stretch, for each radian of noise."""
+"""Metres of root error at the start of a stretch, for each radian of noise."""
 
 IK_SHARE = 0.5
-"""How much of the way the layer of inverse kinematics brings a limb; in use it is `generate.Options.share`, more."""
+"""Share of the distance that the inverse-kinematics layer moves a limb; in use it is `generate.Options.share`, more."""
 
 
-# What is made small: how far answers are from the truth, how far hands and feet are from where they are to be, and how
-# large weights are (Fredriksson §7.5 eq. 7.4, 7.5).
+# Terms of the loss: errors of the outputs, distances of hands and feet from their targets, and the size of the weights
+# (Fredriksson section 7.5 eq. 7.4, 7.5).
 
 
 def joint_error(y, wanted, scale):
-    """The first term of eq. 7.4: mean square of what answers y (B, out) miss, each value in its own deviations
-    (out,)."""
+    """Compute the first term of eq. 7.4: the mean square error of outputs y (B, out), divided by `scale` (out,)."""
     return jnp.mean(((y - wanted) / scale) ** 2)
 
 
 def effector_error(name: str, chains: Chains, settings: ModelSettings, y, wanted, after: Pose, window: Windows):
-    """The third term of eq. 7.5 without its lambda: mean square distance, m^2.
+    """Compute the third term of eq. 7.5 without its lambda: mean square distance, m^2.
 
-    Of a limb that of its wrist or toe in `after` from where the description has it in frame n + 1; else `missed_ends`.
+    For a limb that of its wrist or toe in `after` from the description's position in frame n + 1; otherwise
+    `compute_end_error`.
     """
     if name not in LIMB_OF:
         return missed_ends(name, chains, settings, y, wanted)
@@ -56,18 +59,21 @@ def effector_error(name: str, chains: Chains, settings: ModelSettings, y, wanted
 
 
 def missed_ends(name: str, chains: Chains, settings: ModelSettings, y, wanted):
-    """Mean square distance, m^2, of the ends that answers y (B, out) lead to from those of the truth, in the chain's
-    own reference frame."""
+    """Compute the mean square distance (m^2) of the ends of outputs y (B, out) from those of the truth.
+
+    The ends are in the chain's own reference frame.
+    """
     reached, told = (ends(name, chains, settings, one, ARRAYS) for one in (y, wanted))
     return _mean_square(reached - told)
 
 
 def _mean_square(missed):
+    """Compute the mean square length of vectors (..., 3)."""
     return jnp.mean(jnp.sum(missed**2, axis=-1))
 
 
 def sizes(params) -> jax.Array:
-    """The second term of eq. 7.4 without its lambda: the mean size of the weights, mean over the networks."""
+    """Compute the second term of eq. 7.4 without its lambda: the mean absolute weight, averaged over the networks."""
     weights = [jnp.mean(jnp.concatenate([jnp.abs(w).ravel() for w in one["weights"]])) for one in params.values()]
     return jnp.mean(jnp.stack(weights))
 
@@ -79,13 +85,22 @@ class Networks:
         self, recorded: Recordings, chains: Chains, config: TrainingConfig, leg_reach: dict, limits: JointLimits,
         held: np.ndarray | None = None,
     ):
-        """leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3. limits: which say the way in which
-        elbows and knees bend. held: (N,) examples that `linear` can leave out. InputError where networks that are
-        trained alone are asked to feed frames back."""
+        """Prepare data, scales and regression sums.
+
+        Args:
+            recorded: the recordings.
+            chains: chains of the skeleton.
+            config: configuration of the training.
+            leg_reach: {"left": (shortest, longest) m, "right": ...} of eq. 7.3.
+            limits: joint limits, which give the bending direction of elbows and knees.
+            is_held_out: (N,) bool, examples that `fit_linear` can leave out.
+        Raises:
+            InputError: if networks that are trained alone have to feed frames back.
+        """
         if config.rollout > 1 and not config.settings.conditioned and config.settings.kind == "hierarchy":
             raise InputError("training: rollout", f"{config.rollout} frames without conditioned",
                              "conditioned true, or rollout 1",
-                             "networks trained alone have no frame to feed back")  # fmt: skip
+                             "networks that are trained alone cannot feed frames back")  # fmt: skip
         self.config, self.settings, self.chains, self.leg_reach = config, config.settings, chains, leg_reach
         self.axes = hinge_axes(chains, limits).astype(np.float32)
         self.lengths = recorded.lengths
@@ -95,7 +110,7 @@ class Networks:
         held = np.zeros(len(self.lengths), bool) if held is None else held
         held = np.repeat(held, np.array(self.lengths) - 1)
         told = single_steps(recorded)
-        beside = None  # the same steps from poses beside the truth
+        beside = None  # the same steps from disturbed poses
         if config.linear_start and config.start_noise:
             off = drawn(chains, len(told.pose.root), config.start_noise, config.seed)
             beside = told._replace(pose=disturbed(chains, told.pose, *(one.astype(np.float32) for one in off)))
@@ -116,8 +131,10 @@ class Networks:
         self.data = jax.tree.map(jnp.asarray, (recorded._replace(lengths=()), alone, firsts))
 
     def _sums_of(self, name: str, parts: list, theta, held) -> list[Sums]:
-        """What regression needs of inputs and answers (F, in), (F, out): of rows that are not held out, and of those
-        that are."""
+        """Compute regression sums of the rows that are not held out, and of those that are.
+
+        `parts` are pairs of inputs (F, in) and outputs (F, out).
+        """
         scales, guided = self.scales[name], guides(name, self.chains, self.settings)
         found = []
         for rows in (~held, held):
@@ -130,22 +147,24 @@ class Networks:
         return found
 
     def frames(self, share: float) -> int:
-        """Frames that are fed back when `share` of the training is done; 0: each network alone, one frame from the
-        truth."""
+        """Return the number of frames to feed back when `share` of the training is done.
+
+        0: each network alone, one frame from the truth.
+        """
         conditioned = self.settings.conditioned or self.settings.kind == SINGLE and self.config.rollout > 1
         return self.config.rollout if conditioned and share >= self.config.single_frames else 0
 
     def linear(self, ridge: float, whole: bool = True) -> dict[str, Linear]:
-        """The linear answers by name that networks start from, where they do; whole: also of what is `held`."""
+        """Fit the linear outputs by name that networks start from; whole: also use the examples that are held out."""
         told = {name: kept.plus(held) if whole else kept for name, (kept, held) in self._sums.items()}
         return {name: linear_start(one, ridge) for name, one in told.items()}
 
     def first(self, key) -> dict:
-        """First weights of all networks, by name."""
+        """Build the first weights of all networks, by name."""
         return self.started(key, self.linear(self.ridge or RIDGES[-1]))
 
     def started(self, key, linear: dict[str, Linear]) -> dict:
-        """First weights by name, of networks that start from linear answers, where there are any."""
+        """Build first weights by name, starting from linear outputs where given."""
         settings = self.settings
         return {
             name: first_weights(
@@ -157,8 +176,17 @@ class Networks:
         }
 
     def loss(self, params, data, rows, key, frames: int):
-        """eq. 7.5 summed over the networks, mean over stretches rows (B, 2) (example, first frame) and their frames;
-        frames: of `frames`. data: `data`, handed in so that it is no constant of what is compiled."""
+        """Compute eq. 7.5 summed over the networks, mean over stretches and their frames.
+
+        Args:
+            params: weights by name.
+            data: `data`, passed in so that the compiled code does not contain it as a constant.
+            rows: (B, 2) stretches (example, first frame).
+            key: random key of jax.
+            frames: result of `count_frames`.
+        Returns:
+            The loss, and its parts by name.
+        """
         recorded, alone, firsts = data
         if frames == 0:
             parts = self._alone(params, alone, firsts[rows[:, 0]] + rows[:, 1], key)
@@ -168,7 +196,7 @@ class Networks:
         return sum(parts.values()), parts
 
     def _alone(self, params, alone, steps, key):
-        """Losses by name of single steps (B,), every network on the truth."""
+        """Compute the losses by name of single steps (B,), every network on the truth."""
         parts = {}
         for number, name in enumerate(self.settings.networks):
             x, wanted, theta = (one[steps] for one in alone[name])
@@ -180,7 +208,7 @@ class Networks:
         return parts
 
     def _fed_back(self, params, recorded: Recordings, rows, key, frames: int):
-        """Losses by name of stretches in which every frame is predicted from the one predicted before."""
+        """Compute the losses by name of stretches in which every frame is predicted from the previous prediction."""
         example, start = rows[:, 0], rows[:, 1]
         pose, _ = recorded.at(example, start)
         pose = self._disturbed(pose, jax.random.fold_in(key, frames))
@@ -194,7 +222,7 @@ class Networks:
         return {name: jnp.mean(one) for name, one in parts.items()}
 
     def _frame(self, params, pose: Pose, truth: Pose, window: Windows, key):
-        """One frame on: the state that is predicted, and the losses by name."""
+        """Predict one frame: the next state, and the losses by name."""
         after, parts = pose, {}
         for number, name in enumerate(self.settings.networks):
             x = network_input(name, self.chains, self.settings, pose, after, window, ARRAYS)
@@ -213,19 +241,19 @@ class Networks:
         return after._replace(moved=after.positions - pose.positions), parts
 
     def _answer(self, params, name, x, theta, key):
-        """What a network says, (B, out), of normalised inputs x (B, in)."""
+        """Compute the output (B, out) of a network for normalised inputs x (B, in)."""
         weights, scales = params[name]["weights"], self.scales[name]
         y = forward(weights, params[name]["biases"], x, theta, jnp, self._masks(name, weights, len(x), key))
         return y * scales["output_scale"] + scales["output_mean"]
 
     def _bent(self, number: int, after: Pose, window: Windows) -> Pose:
-        """The pose with a limb brought towards where its end is to be, as use does it."""
+        """Move a limb towards its target, as in use."""
         kept = number >= 2 or self.settings.wrist == "given"
         wanted = window.next[..., number, :]
         return bent_limb(number, self.chains, after, wanted, IK_SHARE, self.axes, kept, ARRAYS)
 
     def _masks(self, name: str, weights, rows: int, key):
-        """Dropout (eq. 3.27) of what each layer is given, or None."""
+        """Sample the dropout masks (eq. 3.27) of each layer's input, or None."""
         share = self.config.keep
         if share >= 1.0 or name not in DROPPED:
             return None
@@ -234,15 +262,19 @@ class Networks:
         return [jax.random.bernoulli(one, share, shape) / share for one, shape in zip(keys, shapes)]
 
     def _looks_at_ends(self, name: str) -> bool:
+        """Return whether the loss of a network includes its end positions."""
         config = self.config
         return config.single_effector if name == SINGLE else config.effector_loss
 
     def _weight(self, name: str) -> float:
+        """Return lambda 2 of a network."""
         return self.config.limb_weight if name in LIMB_OF or name == SINGLE else self.config.body_weight
 
     def _disturbed(self, pose: Pose, key) -> Pose:
-        """Poses (B, ...) with a little noise on the root's place and on each joint that networks move: in use the state
-        is never quite the truth."""
+        """Disturb poses (B, ...) by noise on the root's position and on the joints that networks move.
+
+        In use the state is never exactly the truth.
+        """
         if not self.config.noise:
             return pose
         joints, count = np.array(self.chains.joints), len(pose.root)

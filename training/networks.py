@@ -1,4 +1,4 @@
-"""The networks as jax trains them: first weights, what use has of them (`PhaseNetwork`), and the arrays they run on."""
+"""The networks as jax trains them: first weights, conversion to `PhaseNetwork`, and the array module they use."""
 
 from __future__ import annotations
 
@@ -11,22 +11,29 @@ import numpy as np
 from beyond_mocap.throws.networks.network import PhaseNetwork
 
 SMALLEST_SCALE = 1e-3
-"""Values that hardly change in training are divided by no less than this, so that use does not blow them up."""
+"""Smallest divisor of a value: values that hardly vary in training are not amplified in use."""
 
 
 LIFT = 6.0
-"""What is added to a value that is to pass an ELU unchanged: so many deviations below its mean hardly any comes."""
+"""Offset for a value that has to pass an ELU unchanged: values this many deviations below the mean are very rare."""
 RIDGES = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3)
-"""Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely and run
-away when frames are fed back on another body, or on recordings with some noise."""
+"""Ridges of the linear start, for each row of normalised inputs: smaller ones follow the examples more closely but
+diverge when frames are fed back on another body, or on noisy recordings.
+"""
 GUIDE = 0.01
-"""What the ridge counts for inputs that say how inverse kinematics would reach (`features.guides`): they hold on any
-body, all others are a little of their own."""
+"""Relative ridge of inputs from inverse kinematics (`features.count_guides`): they are valid on any body, all others
+are partly specific to the body.
+"""
 _ROWS = 2048
 
 
 class Linear(NamedTuple):
-    """A linear answer at each control point: weights (K, out, in), biases (K, out)."""
+    """A linear output at each control point.
+
+    Attributes:
+        weights: (K, out, in).
+        biases: (K, out).
+    """
 
     weights: np.ndarray
     biases: np.ndarray
@@ -35,10 +42,23 @@ class Linear(NamedTuple):
 def first_weights(
     key, inputs: int, outputs: int, layers: int, units: int, points: int, linear: Linear | None = None
 ) -> dict:
-    """{"weights": [(K, out, in)], "biases": [(K, out)]}: uniform within sqrt(6 / (in + out)) (Glorot and Bengio 2010),
-    alike at all control points, and the last layer a tenth as large. linear: an answer that the network starts from, on
-    `outputs` of its units, lifted so that ELUs let it pass, where they are at most half; else all control points begin
-    alike, so that the network starts as its feed-forward twin."""
+    """Build the first weights of a network.
+
+    Uniform within sqrt(6 / (in + out)) (Glorot and Bengio 2010), equal at all control points, so that the network
+    starts as its feed-forward equivalent; the last layer a tenth as large.
+
+    Args:
+        key: random key of jax.
+        inputs: number of inputs.
+        outputs: number of outputs.
+        layers: hidden layers.
+        units: units per hidden layer.
+        points: control points K.
+        linear: linear output to start from, on `outputs` of the units, lifted so that ELUs pass it, if they are at
+            most half of the units.
+    Returns:
+        {"weights": [(K, out, in)], "biases": [(K, out)]}.
+    """
     widths = [inputs, *[units] * layers, outputs]
     weights, biases = [], []
     for layer, (width, out) in enumerate(zip(widths, widths[1:])):
@@ -53,7 +73,7 @@ def first_weights(
 
 
 def _passing(weight, bias, linear: Linear, layer: int, last: int):
-    """A layer whose first units carry the linear answer."""
+    """Set the first units of a layer to the linear output."""
     count = linear.weights.shape[1]
     if layer == 0:
         return weight.at[:, :count].set(linear.weights), bias.at[:, :count].set(linear.biases + LIFT)
@@ -64,8 +84,15 @@ def _passing(weight, bias, linear: Linear, layer: int, last: int):
 
 
 class Sums(NamedTuple):
-    """What regression needs of rows: squares (C, C) of the columns, products (C, out) with the answers, how many rows;
-    points: control points; guides: how many of the last inputs are to count `GUIDE` of the ridge."""
+    """Sums over rows for regression.
+
+    Attributes:
+        squares: (C, C) of the columns.
+        products: (C, out) with the outputs.
+        rows: number of rows.
+        points: number of control points.
+        guides: number of last inputs with the relative ridge `GUIDE_RIDGE`.
+    """
 
     squares: np.ndarray
     products: np.ndarray
@@ -74,13 +101,13 @@ class Sums(NamedTuple):
     guides: int = 0
 
     def plus(self, other: "Sums") -> "Sums":
-        """Of both sets of rows."""
+        """Add the sums of two sets of rows."""
         squares, products = self.squares + other.squares, self.products + other.products
         return Sums(squares, products, self.rows + other.rows, self.points, self.guides)
 
 
 def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray, guides: int = 0) -> Sums:
-    """Of normalised inputs x (N, in) and answers y (N, out); theta: (N, K) control point weights."""
+    """Compute the sums of normalised inputs x (N, in) and outputs y (N, out); theta: (N, K) control point weights."""
     points = theta.shape[1]
     count = (x.shape[1] + 1) * (1 if points == 1 else points + 1)
     squares, products = np.zeros((count, count)), np.zeros((count, y.shape[1]))
@@ -93,14 +120,16 @@ def sums(x: np.ndarray, y: np.ndarray, theta: np.ndarray, guides: int = 0) -> Su
 
 
 def linear_start(told: Sums, ridge: float) -> Linear:
-    """The linear answer, whose weights glide with the phase, that comes nearest, by ridge regression.
+    """Fit the linear output with weights that vary with the phase, by ridge regression.
 
-    With one control point that is y = W x + b. With several it is y = sum_k theta_k ((W + D_k) x + b_k): what is common
-    to all phases and what is not are kept small alike, so that no control point strays where it has few frames."""
+    With one control point that is y = W x + b. With several it is y = sum_k theta_k ((W + D_k) x + b_k): common and
+    varying parts have the same ridge, so that no control point diverges where it has few frames.
+    """
     count, out = told.products.shape
     shares = 1 if told.points == 1 else told.points + 1
     weight = np.ones((shares, count // shares))
     weight[:, -1 - told.guides : -1] = GUIDE
+    # columns: `shares` blocks of (inputs, 1); the first is common to all phases, the others belong to one point each
     found = np.linalg.solve(told.squares + np.diag(ridge * told.rows * weight.ravel()), told.products)
     found = found.reshape(shares, count // shares, out)
     every = found if told.points == 1 else found[:1] + found[1:]
@@ -108,7 +137,7 @@ def linear_start(told: Sums, ridge: float) -> Linear:
 
 
 def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
-    """(x, 1), and with several control points also theta_k (x, 1) of each."""
+    """Build the columns (x, 1), and with several control points also theta_k (x, 1) of each."""
     x = np.concatenate([x, np.ones((len(x), 1))], axis=1)
     if theta.shape[1] == 1:
         return x
@@ -116,27 +145,26 @@ def _columns(x: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 
 def scales_of(values: np.ndarray, smallest: float = SMALLEST_SCALE) -> tuple[np.ndarray, np.ndarray]:
-    """Mean and standard deviation of each column, float32, the latter at least `smallest` (its share of the
-    largest)."""
+    """Compute mean and standard deviation of each column, float32, the latter at least `smallest`."""
     mean, scale = values.mean(0), values.std(0)
     return mean.astype(np.float32), np.maximum(scale, smallest).astype(np.float32)
 
 
 def to_use(params: dict, scales: dict) -> PhaseNetwork:
-    """The trained network for use; scales: input_mean, input_scale, output_mean, output_scale."""
+    """Convert trained parameters to a network; scales: input_mean, input_scale, output_mean, output_scale."""
     arrays = {name: tuple(np.asarray(one) for one in params[name]) for name in ("weights", "biases")}
     return PhaseNetwork(**arrays, **{name: np.asarray(value) for name, value in scales.items()})
 
 
 class _Arrays:
-    """`jax.numpy`, but for `take`."""
+    """`jax.numpy` with a different `take`."""
 
     def __getattr__(self, name: str):
         return getattr(jnp, name)
 
     @staticmethod
     def take(values, indices: np.ndarray, axis: int):
-        """`values` at fixed `indices` along an axis: runs of neighbours are sliced and put together."""
+        """Take values at fixed indices along an axis: runs of neighbours are sliced and joined."""
         axis = axis % values.ndim
         indices = [int(index) for index in indices]
         starts = [i for i, index in enumerate(indices) if i == 0 or index != indices[i - 1] + 1]
@@ -145,4 +173,4 @@ class _Arrays:
 
 
 ARRAYS = _Arrays()
-"""The array module that training gives to everything that takes one (`xp`)."""
+"""Array module that training passes to every function with a parameter `xp`."""

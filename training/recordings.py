@@ -1,7 +1,7 @@
-"""Examples as arrays of one length, in float32, as a training reads them frame by frame; and poses beside them.
+"""Examples as arrays of equal length, in float32, for training frame by frame; and poses near them.
 
-In use a network is given what networks said before, never quite the truth; from poses beside it that lead back to it,
-networks learn to come back (Holden, Komura and Saito 2017 do so with dropout).
+In use a network receives its own earlier output, never exactly the truth; from disturbed poses that lead back to the
+truth, networks learn to return (Holden, Komura and Saito 2017 use dropout for that).
 """
 
 from __future__ import annotations
@@ -24,33 +24,45 @@ from beyond_mocap.throws.networks.model import ModelSettings
 from beyond_mocap.throws.networks.training_set import Steps
 
 FACING = 5.0
-"""Radians by which a whole body is turned about the upright, for each radian of its joints."""
+"""Radians by which a whole body is rotated about the vertical, for each radian of joint noise."""
 PLACE = 0.4
-"""Metres by which its root is off, for each radian."""
+"""Metres of root error, for each radian of joint noise."""
 
 
 class Recordings(NamedTuple):
-    """N examples, each held at its last frame up to the longest, T frames. pose, window: their arrays (N, T, ...).
-    lengths (N,): frames of each example."""
+    """N examples, each extended by its last frame to the longest, T frames.
+
+    Attributes:
+        pose: arrays (N, T, ...).
+        window: arrays (N, T, ...).
+        lengths: (N,) frames of each example.
+    """
 
     pose: Pose
     window: Windows
     lengths: tuple[int, ...]
 
     def at(self, example, frame):
-        """Poses and windows (B, ...) of frames (B,) of examples (B,)."""
+        """Return poses and windows (B, ...) of frames (B,) of examples (B,)."""
         return Pose(*(one[example, frame] for one in self.pose)), Windows(*(one[example, frame] for one in self.window))
 
     @property
     def digest(self) -> str:
-        """A short hash of all numbers in them."""
+        """Short hash of all values."""
         return hex_digest(repr(self.lengths), self.pose.root, self.pose.local, *self.window)
 
 
 def recordings(examples: Sequence[Example], reference: np.ndarray | None = None) -> Recordings:
-    """The examples' arrays. reference: of warped phases, or None. InputError where there is no example."""
+    """Build the arrays of examples.
+
+    Args:
+        examples: the examples.
+        reference: (N,) speed curve of warped phases, or None.
+    Raises:
+        InputError: if there is no example.
+    """
     if not examples:
-        raise InputError("training", "no example", "one throw or kick at least")
+        raise InputError("training", "no example", "at least one throw or kick")
     lengths = tuple(len(example.motion) for example in examples)
     longest = max(lengths)
     pose = [poses(example) for example in examples]
@@ -59,7 +71,7 @@ def recordings(examples: Sequence[Example], reference: np.ndarray | None = None)
 
 
 def _padded(parts: list, longest: int) -> list[np.ndarray]:
-    """Each field of tuples of arrays (T, ...) as one array (N, longest, ...), float32."""
+    """Pad and stack each field of tuples of arrays (T, ...) to one array (N, longest, ...), float32."""
     out = []
     for field in zip(*parts):
         held = [np.concatenate([one, np.repeat(one[-1:], longest - len(one), axis=0)]) for one in field]
@@ -68,7 +80,7 @@ def _padded(parts: list, longest: int) -> list[np.ndarray]:
 
 
 def single_steps(recorded: Recordings) -> Steps:
-    """All frames that have one after them (F, ...), example by example."""
+    """Build the steps (F, ...) from all frames that have a next one, example by example."""
     example = np.concatenate([np.full(length - 1, i) for i, length in enumerate(recorded.lengths)])
     frame = np.concatenate([np.arange(length - 1) for length in recorded.lengths])
     pose, window = recorded.at(example, frame)
@@ -76,8 +88,10 @@ def single_steps(recorded: Recordings) -> Steps:
 
 
 def step_arrays(name: str, chains: Chains, settings: ModelSettings, told: Steps, reach: dict):
-    """Inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over steps, float32. reach: of the legs, as
-    `phase_of` takes it."""
+    """Build inputs X (F, in), outputs Y (F, out) and phases (F,) of a network over steps, float32.
+
+    `reach` is the leg reach, as for `compute_phase`.
+    """
     x = network_input(name, chains, settings, *told)
     y = network_output(name, chains, settings, told.pose, told.after)
     phase = phase_of(name, chains, told.after, told.window, reach)
@@ -85,8 +99,17 @@ def step_arrays(name: str, chains: Chains, settings: ModelSettings, told: Steps,
 
 
 def drawn(chains: Chains, count: int, noise: float, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Joints' turns (N, J, 3) rad, the bodies' turns (N,) rad and shifts (N, 3) m: normal, none of joints that ride
-    along; `noise`: the joints' standard deviation in radians."""
+    """Sample normal noise for poses.
+
+    Args:
+        chains: chains of the skeleton.
+        count: number N of poses.
+        noise: rad, standard deviation of the joints.
+        seed: of the noise.
+    Returns:
+        Rotation vectors of the joints (N, J, 3) rad, zero for joints that no network moves, rotations of the bodies
+        (N,) rad and shifts (N, 3) m.
+    """
     rng = np.random.default_rng(seed)
     vectors = np.zeros((count, len(chains.skeleton), 3))
     vectors[:, list(chains.joints)] = noise * rng.normal(size=(count, len(chains.joints), 3))
@@ -94,8 +117,16 @@ def drawn(chains: Chains, count: int, noise: float, seed: int) -> tuple[np.ndarr
 
 
 def disturbed(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose:
-    """Poses (B, ...) whose joints are turned by rotation vectors (B, J, 3), and which stand `shift` (B, 3) m beside,
-    turned about the upright through the hips by `facing` (B,) radians; how they moved stays."""
+    """Disturb poses (B, ...); their displacements `moved` stay.
+
+    Args:
+        chains: chains of the skeleton.
+        pose: the poses.
+        vectors: (B, J, 3) rad, rotation vectors of the joints.
+        facing: (B,) rad, rotation about the vertical through the hips.
+        shift: (B, 3) m.
+        xp: numpy or jax.numpy.
+    """
     skeleton, hips = chains.skeleton, pose.positions[..., chains.hips, :]
     about = small_turns(facing[..., None] * np.array([0.0, 0.0, 1.0], dtype=pose.root.dtype), xp)
     local = xp.matmul(pose.local, small_turns(vectors, xp))
@@ -106,7 +137,7 @@ def disturbed(chains: Chains, pose: Pose, vectors, facing, shift, xp=np) -> Pose
 
 
 def small_turns(vectors, xp=np):
-    """Rotations (..., 3, 3) by rotation vectors (..., 3) in radians (Rodrigues)."""
+    """Convert rotation vectors (..., 3) rad to rotations (..., 3, 3) (Rodrigues)."""
     angle = xp.sqrt(xp.sum(vectors**2, -1) + 1e-12)[..., None, None]
     skew = skew_matrix(vectors, xp)
     return (

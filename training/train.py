@@ -1,6 +1,7 @@
-"""From a folder of examples to a model: what `throw train` and the experiments call.
+"""Train a model from a folder of examples: used by `throw train` and the experiments.
 
-The ridge of the linear start is chosen by what it is for: frames fed back on movements that regression did not see.
+The ridge of the linear start is chosen by its purpose: frames fed back on movements that were not used in the
+regression.
 """
 
 from __future__ import annotations
@@ -32,11 +33,11 @@ from .networks import RIDGES, to_use
 from .recordings import recordings
 
 _RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
-_FOURTH = 4
+_FOURTH = 4  # every fourth movement of a single subject is held out
 _MOST = 8  # movements that are generated for each ridge
-_ALIKE = 1.05  # so much more than the least still counts as the least: of those, the largest ridge is the safest
+_ALIKE = 1.05  # errors up to this multiple of the lowest count as equal; the largest ridge of those is the safest
 READING = 0.05
-"""Share of the progress that reading the folder is."""
+"""Share of the progress for reading the folder."""
 
 
 def train(
@@ -44,10 +45,20 @@ def train(
     minutes: float | None = None, progress: Callable[[float, str], None] = lambda fraction, text: None,
     cancelled: Callable[[], bool] = lambda: False,
 ) -> ThrowModel:
-    """A model trained on examples of one skeleton, at the config's rate.
+    """Train a model on examples of one skeleton, at the config's frame rate.
 
-    checkpoint: where one is kept, and found with `resume`. minutes: stop then with what stands. InputError: no example,
-    different skeletons or rates, a checkpoint of another training; Cancelled where asked to stop."""
+    Args:
+        examples: the examples.
+        config: configuration of the training.
+        checkpoint: file of the checkpoint, used by `resume`, or None.
+        resume: continue from the checkpoint.
+        minutes: time limit, or None.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    Raises:
+        InputError: if there is no example, skeletons or rates differ, or the checkpoint is of another training.
+        Cancelled: if `cancelled` returns True.
+    """
     _check(examples, config)
     settings = config.settings
     chains = shared_chains(examples)
@@ -68,7 +79,7 @@ def train(
         )
 
     if config.linear_start and not config.ridge:
-        progress(0.0, "the start is chosen")
+        progress(0.0, "choosing the start")
         problem.ridge = least_astray(problem, [one for one, out in zip(seen, held) if out], model_of, cancelled)
     trained = fit(
         problem, config, checkpoint=checkpoint, resume=resume, minutes=minutes, progress=progress, cancelled=cancelled,
@@ -77,8 +88,10 @@ def train(
 
 
 def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
-    """At most so many of the examples, all of the first one's subject (movements of one manner are blended better), of
-    different targets: the first, then always the one whose impact is farthest from those taken."""
+    """Select at most `most` examples of the first one's subject with different targets.
+
+    The first, then always the one whose impact is farthest from those selected. Movements of one style blend better.
+    """
     examples = [example for example in examples if example.subject == examples[0].subject]
     places = np.array([(*example.impact, 10.0 * example.limb) for example in examples])
     taken = [0]
@@ -91,14 +104,16 @@ def spread_over(examples: Sequence[Example], most: int) -> list[Example]:
 
 
 def _check(examples: Sequence[Example], config: TrainingConfig) -> None:
+    """Raise InputError if an example has another frame rate than the config."""
     wanted = config.settings.fps
     for example in examples:
         if abs(example.motion.fps - wanted) > 1e-6:
             found = f"{example.motion.fps:g} frames per second"
-            raise InputError(f"example {example.name}", found, f"{wanted:g} as the config has", "read it at that rate")
+            raise InputError(f"example {example.name}", found, f"{wanted:g}, the config's rate", "read it at that rate")
 
 
 def _line(examples: Sequence[Example], trained: Trained) -> str:
+    """Describe the training in one line."""
     subjects = len({example.subject for example in examples})
     frames = sum(len(example.motion) for example in examples)
     whom = f"{len(examples)} examples of {subjects} subject{'s' if subjects > 1 else ''}, {frames} frames"
@@ -107,8 +122,11 @@ def _line(examples: Sequence[Example], trained: Trained) -> str:
 
 
 def held_out(examples: Sequence[Example]) -> np.ndarray:
-    """Which examples (N,) are left out while the ridge is chosen: all of the last subject, or a fourth of one
-    subject's; none of three examples or fewer. An example's mirror image goes with it."""
+    """Select the examples (N,) bool to hold out while the ridge is chosen.
+
+    All of the last subject, or a fourth of a single subject's; none of three examples or fewer. An example's mirror
+    image is held out with it.
+    """
     subjects = list(dict.fromkeys(example.subject for example in examples))
     if len(subjects) > 1:
         return np.array([example.subject == subjects[-1] for example in examples])
@@ -123,15 +141,23 @@ def least_astray(
     problem: Networks, held: Sequence[Example], model_of: Callable[[dict, str], ThrowModel],
     cancelled: Callable[[], bool] = lambda: False,
 ) -> float:
-    """Of `RIDGES` the one whose networks keep hands and feet nearest to where they are wanted, on movements of which
-    regression saw nothing. model_of: a model out of parameters and a line. The largest where nothing is held out."""
+    """Choose the ridge whose networks keep hands and feet nearest to their targets on held out movements.
+
+    Args:
+        problem: the training problem.
+        held: examples that the regression does not use; if empty, the largest ridge is returned.
+        build_model: function that builds a model from parameters and a line of text.
+        cancelled: returns True to stop.
+    Returns:
+        One of `RIDGES`.
+    """
     if not held:
         return RIDGES[-1]
     asked = [held[i] for i in np.unique(np.linspace(0, len(held) - 1, _MOST).round().astype(int))]
     off = []
     for ridge in RIDGES:
         if cancelled():
-            raise Cancelled("stopped while the start was chosen")
+            raise Cancelled("cancelled while choosing the start")
         model = model_of(problem.started(jax.random.key(0), problem.linear(ridge, whole=False)), "")
         off.append(np.mean([_off(model, example) for example in asked]))
     good = [ridge for ridge, one in zip(RIDGES, off) if one <= _ALIKE * min(off)]
@@ -139,8 +165,7 @@ def least_astray(
 
 
 def _off(model: ThrowModel, example: Example) -> float:
-    """Metres by which what the networks say misses, mean over frames, hands and feet; a body that is lost is far
-    off."""
+    """Measure the mean error (m) of the networks over frames, hands and feet; infinite if the body is invalid."""
     try:
         with np.errstate(all="ignore"):
             made = generate(model, describe(example), options=_RAW)
@@ -150,7 +175,7 @@ def _off(model: ThrowModel, example: Example) -> float:
 
 
 def train_folder(options, told: Told) -> None:
-    """Reads the folder, trains, and writes the model and its checkpoint; options: of `throw train`."""
+    """Read the folder, train, and write the model and its checkpoint; options: of `throw train`."""
     begun = time.perf_counter()
     config = read_config(options.config, seed=options.seed, epochs=options.epochs, action=options.action)
     kept = checkpoint_path(options.out)
@@ -174,7 +199,7 @@ def train_folder(options, told: Told) -> None:
 
 
 def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
-    """The folder's examples of the asked subjects, on one skeleton: the given one, else that of the first."""
+    """Read the folder's examples of the requested subjects, on the given skeleton or the first one's."""
     skeleton = _skeleton(options.skeleton) if options.skeleton else None
     found = _read(options, config, told, skeleton)
     first = found[0].motion.skeleton
@@ -184,7 +209,7 @@ def _examples(options, config: TrainingConfig, told: Told) -> list[Example]:
 
 
 def _skeleton(path: Path) -> Skeleton:
-    """Whose bones the model is to have. InputError that names the file where it lacks hands or feet."""
+    """Read the skeleton of the model; InputError with the file's name if it lacks hands or feet."""
     skeleton = bvh.read(path).motion.skeleton
     try:
         chains_of(skeleton)
@@ -194,6 +219,7 @@ def _skeleton(path: Path) -> Skeleton:
 
 
 def _read(options, config: TrainingConfig, told: Told, skeleton) -> list[Example]:
+    """Read the examples and select the requested subjects."""
     def progress(share: float, text: str) -> None:
         told.progress(READING * share, text)
 

@@ -1,12 +1,12 @@
-"""A throw or kick made to hit: the smallest change of a motion with which the ball, as it leaves, flies to its target.
+"""Correct a throw or kick so that it hits: the smallest change of a motion with which the ball flies to its target.
 
-A ball in the hand has the hand's velocity when it leaves; a ball that lies gets its own from the foot that meets it
-(`letting_go`). Both follow from the motion alone, between frames too (`motion.motion.cubic_at`), so a ball that is to
-fly elsewhere asks for another motion. What people change when they aim comes first and costs little: the body turns,
-the ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. What is left is a
-small smooth shift of the wrist or ankle about that instant (`led_limb`), which the arm or leg follows by inverse
-kinematics. Among all changes with which the ball hits, with drag, lift and gravity as in `ball.physics`, the one that
-costs least is found by Newton's method with Lagrange's multipliers; the release is looked for on a grid.
+A held ball has the velocity of the hand when it leaves; a ball at rest gets its velocity from the foot that strikes
+it (`ball_release`). Both follow from the motion alone, between frames too (`motion.motion.cubic_at`), so another
+flight needs another motion. Changes that people make when they aim come first and cost little: the body rotates, the
+ball leaves a few milliseconds earlier or later, the whole movement is a little slower or faster. The rest is a small
+smooth shift of the wrist or ankle about that instant (`limb_shift`), which the arm or leg follows by inverse
+kinematics. Among all changes with which the ball hits, with drag, lift and gravity as in `ball.physics`, the one of
+lowest cost is found by Newton's method with Lagrange multipliers; the release is searched on a grid.
 """
 
 from __future__ import annotations
@@ -24,25 +24,31 @@ from .led_limb import Hold, LedLimb, at_once, shifts_about
 from .letting_go import AtFoot, InHand, carried, grip_point
 
 FINE, LITTLE = 0.02, 0.05
-"""m of miss and of moved wrist up to which the pace is left as it is."""
+"""m of miss and of wrist displacement up to which the pace is not changed."""
 CLOSE = 1e-3
-"""m from the target at which nothing more is changed."""
-# What costs as much as a metre of moved wrist: radians of turning, share of pace, seconds of release, m/s of speed
-# that is asked for and of speed that is not, metres of ball.
+"""m from the target at which the correction ends."""
+# Changes that cost as much as a metre of wrist displacement: radians of rotation, share of pace, seconds of release,
+# m/s of requested speed and of unrequested speed, metres of ball position.
 _TURN, _PACE, _LATER, _SPEED, _OWN_SPEED, _REST = 8.0, 1.5, 1.5, 30.0, 300.0, 10.0
-_ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41
-_LOOKS, _TRIED = 4, 2
-_LEAST_STEP = 0.05  # of what the slopes say, below which nothing more comes of it
-# m of miss after which, and the rounds after which, little more than contortions comes of it
+_ROUNDS, _FREE_ROUNDS, _GRID = 12, 2, 41  # Newton steps, those of lowest total cost, releases on the grid
+_LOOKS, _TRIED = 4, 2  # linear searches for a foot, and candidates that are then solved exactly
+_LEAST_STEP = 0.05  # share of a Newton step below which the search ends
+# m of miss and steps after which the search ends, because only implausible poses are left
 _FAR, _FAR_ROUNDS = 1.0, 4
-_STEP = 1e-3  # of frames, metres, m/s and radians, in differences
+_STEP = 1e-3  # frames, metres, m/s and radians, steps of numerical derivatives
 _LEAST = 3  # frames that a motion needs before and after the release
 
 
 @dataclass(frozen=True)
 class Freedom:
-    """What may be changed beside wrist or ankle: turn rad about the start, pace as a share, release s, each to either
-    side. elsewhere: whether the body may begin elsewhere, so that its foot finds a ball whose place is given."""
+    """What may be changed besides wrist or ankle, each to either side.
+
+    Attributes:
+        rotation: rad, rotation about the start.
+        pace: share of the playback rate.
+        release: s.
+        start_position: the body may begin at another position, so that its foot reaches a ball at a given position.
+    """
 
     turn: float = np.radians(15.0)
     pace: float = 0.15
@@ -51,7 +57,7 @@ class Freedom:
 
     @classmethod
     def anchored(cls) -> Freedom:
-        """For a motion that is joined to others before and behind: it keeps its place, its facing and its frames."""
+        """Return the freedom of a motion that is joined to others: it keeps its position, heading and frames."""
         return cls(0.0, 0.0, 0.02, False)
 
 
@@ -59,11 +65,22 @@ class Freedom:
 class Corrected:
     """A motion whose ball hits.
 
-    frame: fractional, at which the ball leaves. position (3,) m, velocity (3,) m/s, spin (3,) rad/s of the ball then.
-    seconds: until it is at the target, and miss: m that it passes by. moved: m that the wrist or ankle was moved at
-    most, by `shift` (T, 3) m at each frame; turned: rad that the body was turned about its start; pace: the factor on
-    its speed; later: s that the ball leaves after it would have at that pace; elsewhere: m that the body begins
-    beside where it began. gap: m between foot and ball, 0 for throws."""
+    Attributes:
+        motion: the motion.
+        frame: fractional frame at which the ball leaves.
+        position: (3,) m of the ball then.
+        velocity: (3,) m/s of the ball then.
+        spin: (3,) rad/s of the ball then.
+        seconds: s until it is at the target.
+        miss: m between ball and target then.
+        displacement: m, largest displacement of the wrist or ankle.
+        shift: (T, 3) m, displacement of the wrist or ankle in each frame.
+        rotation: rad by which the body was rotated about its start.
+        pace: factor of the playback rate.
+        release_delay: s by which the release was moved, at that pace.
+        start_offset: m by which the start was moved.
+        gap: m between foot and ball, 0 for throws.
+    """
 
     motion: Motion
     frame: float
@@ -82,7 +99,7 @@ class Corrected:
 
     @property
     def missed(self) -> float:
-        """m in all, past the target and between foot and ball."""
+        """Total miss (m): at the target, and between foot and ball."""
         return self.miss + self.gap
 
 
@@ -90,11 +107,21 @@ def corrected(
     motion: Motion, part: InHand | AtFoot, frame: float, target: np.ndarray, ball: Ball,
     freedom: Freedom | None = None, speed: float | None = None, hold: Hold | None = None,
 ) -> Corrected:
-    """The motion changed so that the ball leaves it about the fractional `frame` and flies through `target` (3,) m.
+    """Correct a motion so that the ball leaves at about `frame` and flies through the target.
 
-    speed: m/s wished for as it leaves; it gives way where the body's own is far from it. hold: what keeps the limb's
-    joints within their limits; where that leaves no way to the target the ball misses. InputError: a body without that
-    limb, a release at the motion's very ends, a target where the ball is."""
+    Args:
+        motion: the motion.
+        part: hand or foot that releases the ball.
+        frame: fractional frame of the release.
+        target: (3,) m, world.
+        ball: kind of ball.
+        freedom: what may be changed; None for the default.
+        speed: m/s requested at the release; a soft request if the body's own speed is far from it.
+        limit_rotations: limits the rotations of the limb; the ball misses if no motion within the limits hits.
+    Raises:
+        InputError: if the body lacks the limb, the release is at the motion's very ends, or the target is at the
+            ball.
+    """
     freedom = freedom or Freedom()
     target = np.maximum(np.asarray(target, float), [-np.inf, -np.inf, ball.radius])
     part.chain(motion)
@@ -107,14 +134,18 @@ def corrected(
 
 @dataclass(frozen=True, eq=False)
 class _Change:
-    """What is changed in all: place (3,) m and velocity (3,) m/s of the part at the release, turn rad, pace as a share,
-    rest (F,) m of the ball against the body, one of which stays where it is; seconds: until it arrives. As one row (9
-    + F,)."""
+    """All changes in one row (9 + F,).
+
+    The row contains position (3,) m and velocity (3,) m/s of the part at the release, rotation (rad), pace (share),
+    F free coordinates (m) of the ball relative to the body, one of which stays at its place, and the s until the
+    ball arrives.
+    """
 
     row: np.ndarray
 
     @classmethod
     def none(cls, free: int, seconds: float) -> _Change:
+        """Build a row without changes."""
         row = np.zeros(9 + free)
         row[-1] = seconds
         return cls(row)
@@ -128,7 +159,7 @@ class _Change:
 
 
 class _Search:
-    """One correction. `frame`: of the motion as it was given."""
+    """One correction; `frame` refers to the motion as given."""
 
     def __init__(self, motion, part, frame, target, ball, freedom: Freedom, speed, hold):
         self.given, self.part, self.asked = motion, part, frame
@@ -140,7 +171,7 @@ class _Search:
         self._rigid = (6, 7, 8, 9) if self.walks else (6, 7)
 
     def whole(self) -> Corrected:
-        """First what costs little, then what is left; the pace is changed only where it has to be."""
+        """Run the search: first changes of low cost, then the rest; the pace is changed only if necessary."""
         tried = []
         for pace in (0.0, self.freedom.pace):
             self.bounds = np.array([self.freedom.turn, pace])
@@ -154,8 +185,10 @@ class _Search:
         return min(tried, key=lambda found: found.missed + 0.2 * found.moved)
 
     def _promising(self, start) -> list[tuple[_Change, float]]:
-        """Changes of what costs little, and their releases; the one that leaves least to be moved first. Slopes lead
-        astray where a foot meets a ball, so each is judged by where it really leads."""
+        """List changes of low cost with their releases, the one with the smallest remaining displacement first.
+
+        Derivatives are misleading where a foot strikes a ball, so each candidate is evaluated exactly.
+        """
         now = _Change.none(self.free, self._seconds(self.given, self.asked, start)), self.asked
         found = []
         for _ in range(_LOOKS if isinstance(self.part, AtFoot) else 2):
@@ -164,7 +197,7 @@ class _Search:
         return [each for _, _, each in sorted(found, key=lambda one: one[:2])]
 
     def _left_over(self, change: _Change, source: float, start) -> float:
-        """What moving the limb would still cost."""
+        """Compute the remaining cost of displacing the limb."""
         motion, frame = self._moved(change), source / (1.0 + change.pace)
         points, velocities = carried(self.part, motion, np.array([frame]))
         costs = self._cost(motion, frame), at_once(points.shape[1])
@@ -173,19 +206,19 @@ class _Search:
         return sum(float(pair @ costs[0] @ pair) for pair in rows[0, :6].reshape(2, 3).T)
 
     def _seconds(self, motion: Motion, frame: float, rest) -> float:
-        """s until a ball that is not slowed is as far as the target."""
+        """Estimate the s until a ball without drag is as far away as the target."""
         points, velocities = carried(self.part, motion, np.array([frame]))
         position, velocity, _, _ = self.part.leaves(points, velocities, rest[None], self.ball)
         way = (self.target - position[0]) * [1.0, 1.0, 0.0]
         far = float(np.linalg.norm(self.target - position[0]))
         if far < 4.0 * self.ball.radius:
             found = f"{far:.2f} m from where the ball leaves"
-            raise InputError("target", found, "a target some way off", "move it away")
+            raise InputError("target", found, "a target some distance away", "move it away")
         along = max(float(velocity[0] @ way) / max(np.linalg.norm(way), 1e-9), 0.3 * np.linalg.norm(velocity[0]), 1.0)
         return float(np.clip(1.05 * far / along, 0.05, 4.0))
 
     def _moved(self, change: _Change) -> Motion:
-        """The motion turned and at its pace."""
+        """Build the rotated motion at its changed pace."""
         motion = self.given
         if change.pace:
             frames = np.arange(int(np.floor((len(motion) - 1) / (1.0 + change.pace))) + 1) * (1.0 + change.pace)
@@ -197,8 +230,10 @@ class _Search:
         return place(motion, 0.0, -change.rest) if self.walks else motion
 
     def _looked(self, change: _Change, source: float, start) -> tuple[_Change, float]:
-        """Turn, pace and release that leave least to be moved: all releases on a grid, each with the change that is
-        best by the slopes there."""
+        """Find rotation, pace and release with the smallest remaining displacement.
+
+        All releases on a grid are compared, each with the best change according to the derivatives there.
+        """
         motion = self._moved(change)
         within = self.freedom.release * self.given.fps
         sources = np.clip(self.asked + np.linspace(-within, within, _GRID), _LEAST, len(self.given) - 1 - _LEAST)
@@ -211,7 +246,7 @@ class _Search:
         return _Change(rows[best]), float(sources[best])
 
     def _hit(self, change: _Change, source: float, start) -> Corrected:
-        """Newton's steps with the arm or leg as it follows; the best of them."""
+        """Take Newton steps with the arm or leg as it really follows; return the best of them."""
         motion = self._moved(change)
         frame = source / (1.0 + change.pace)
         limb = LedLimb.of(motion, self.part, shifts_about(frame, *self._span(motion, frame), motion.fps), self.hold)
@@ -238,20 +273,32 @@ class _Search:
         return best
 
     def _span(self, motion: Motion, frame: float) -> tuple[int, int]:
+        """Return the first and last frame that may be changed, never the ends of the motion."""
         first, last = self.part.span(motion, frame)
         return max(first, 1), min(last, len(motion) - 2)
 
     def _cost(self, motion: Motion, frame: float) -> np.ndarray:
+        """Compute the cost (2, 2) of a shift in position and velocity at a frame."""
         return shifts_about(frame, *self._span(motion, frame), motion.fps).cost
 
     def _arrives(self, points, velocities, turn, pace, rest, seconds):
-        """Where the balls (B) are (B, 3) m, their gaps (B, G) and their speeds (B,), for parts turned by `turn` (B,)
-        rad and faster by the share `pace` (B,)."""
+        """Compute where balls (B) are after `seconds`.
+
+        Args:
+            points: (B, K, 3) m of hand or foot.
+            velocities: (B, K, 3) m/s.
+            turn: (B,) rad by which the parts are rotated.
+            pace: (B,) share by which they are faster.
+            rest: (B, 3) m, positions of balls at rest.
+            seconds: (B,) s.
+        Returns:
+            Positions (B, 3) m, gaps (B, G) m and initial speeds (B,) m/s.
+        """
         about = quaternion.about_up(turn)[:, None]
         points = quaternion.rotate(about, points - self.pivot) + self.pivot
         velocities = quaternion.rotate(about, velocities) * (1.0 + pace)[:, None, None]
         position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
-        count = np.zeros(len(position), int)  # in the air, even below the ground: slopes go on there
+        count = np.zeros(len(position), int)  # in flight, even below the ground, so that derivatives continue there
         balls = batch.Balls(position.copy(), velocity, np.array(spin), count, count)
         there = batch.after(balls, self.ball, np.maximum(seconds, 1e-3), most_bounces=0).position
         return there, gap, np.linalg.norm(velocity, axis=-1)
@@ -259,11 +306,24 @@ class _Search:
     def _best(
         self, points, velocities, now: _Change, start, cost, follows, fixed=(), near=False
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Changes (N, 9 + F) in all, and what they cost (N,), of parts at N releases, of which `now` is changed
-        already: the least with which the ball would hit if all went on along its slopes. near: the least away from
-        `now` instead, which comes to the target where the slopes do not hold for long."""
+        """Compute the change of lowest cost with which the ball hits, according to the derivatives, for N releases.
+
+        Args:
+            points: (N, K, 3) m of hand or foot, changed by `current`.
+            velocities: (N, K, 3) m/s.
+            current: present change.
+            start: (3,) m of the ball.
+            cost: (2, 2) cost of a shift.
+            response: response of the limb, see `ShiftedLimb`.
+            fixed: indices of the change that stay.
+            stays_near: minimise the distance to `current` instead, which converges where the derivatives hold only
+                nearby.
+        Returns:
+            Changes (N, 9 + F), and their costs (N,).
+        """
         short, slopes, speed, faster = self._slopes(points, velocities, now, start, follows)
         count, size = len(points), len(now.row)
+        # row: 0-2 position, 3-5 velocity, 6 rotation, 7 pace, 8 .. size - 2 ball, size - 1 seconds until arrival
         weight = np.zeros((size, size))
         for axis in range(3):
             weight[np.ix_([axis, 3 + axis], [axis, 3 + axis])] = cost
@@ -290,10 +350,11 @@ class _Search:
 
     @staticmethod
     def _least(hessian, pull, slopes, level, rows, free) -> np.ndarray:
-        """Rows (N, S) with the entries `free` chosen: least u H u / 2 - pull u with slopes u = level."""
+        """Solve rows (N, S) that minimise u H u / 2 - pull u under slopes u = level; only the entries `free` vary."""
         count, size, held = len(rows), len(free), slopes.shape[1]
         rest = rows.copy()
         rest[:, free] = 0.0
+        # Karush-Kuhn-Tucker system: Hessian, constraints and their transpose, tiny negative diagonal of the multipliers
         matrix = np.zeros((count, size + held, size + held))
         matrix[:, :size, :size] = hessian[:, free][:, :, free]
         matrix[:, size:, :size] = slopes[:, :, free]
@@ -308,11 +369,21 @@ class _Search:
         return out
 
     def _slopes(self, points, velocities, now: _Change, start, follows):
-        """What is missing (N, 3 + G) to target and contact, how it changes (N, 3 + G, S) with the change, the ball's
-        speed (N,) and how that changes (N, S). `points`, `velocities`: as `now` has made them; follows: see
-        `LedLimb`."""
+        """Compute the errors and their derivatives with respect to the change.
+
+        Args:
+            points: (N, K, 3) m, changed by `current`.
+            velocities: (N, K, 3) m/s.
+            current: present change.
+            start: (3,) m of the ball.
+            response: response of the limb, see `ShiftedLimb`.
+        Returns:
+            Errors (N, 3 + G) at target and contact, their derivatives (N, 3 + G, S), the ball's speed (N,) and its
+            derivatives (N, S).
+        """
         count, size = len(points), len(now.row)
         each = size + 1
+        # each release is evaluated size + 1 times: unchanged, then with a step in every entry of the change
         nudge = _STEP * np.vstack([np.zeros(size), np.eye(size)])
         nudge = np.tile(nudge, (count, 1))
         spread = [np.repeat(value, each, axis=0) for value in (points, velocities)]
@@ -329,7 +400,7 @@ class _Search:
         return missing[:, 0], slopes, speed[:, 0], (speed[:, 1:] - speed[:, :1]) / _STEP
 
     def _judged(self, before, now, frame, source, change, start, points, velocities) -> Corrected:
-        """What has come of it."""
+        """Build the result of a change."""
         rest = (start if self.walks else start + change.rest)[None]
         position, velocity, spin, gap = self.part.leaves(points, velocities, rest, self.ball)
         none = np.zeros(1)

@@ -1,10 +1,11 @@
-"""The recipe: how good a trained model of throws or kicks is on motions that it never saw (Fredriksson §4.5, §8.3).
+"""Evaluate a trained model of throws or kicks on motions that it was not trained on.
 
-`evaluate_throws(model, examples)` takes what was known of each example beforehand, scaled by height to the model's body
-as §4.5 has it, generates the motion again, and compares: hands and feet with where they were wanted (eq. 4.1), where
-the ball goes with where it was to go, the head, the smoothness, the bones, joints' limits, seconds. The ball is held
-until the release and leaves with the place and velocity that it has then between two frames, read off a spline of the
-body's rotations: by places alone a hand that throws, seen 30 times a second, is a tenth too slow.
+`evaluate_throws(model, examples)` takes the description of each example, scaled by height to the model's body
+(section 4.5), generates the motion and compares: hands and feet with their targets (eq. 4.1), the ball's impact with
+its target, the head, smoothness, bone lengths, joint limits, computing time. The ball is held until the release and
+leaves with its position and velocity then, between two frames, computed from a spline of the body's rotations: from
+positions alone the velocity of a throwing hand, sampled 30 times per second, is a tenth too low.
+Source: Fredriksson sections 4.5 and 8.3.
 """
 
 from __future__ import annotations
@@ -33,33 +34,42 @@ from .networks.limits import JointLimits
 from .networks.model import ThrowModel
 
 RAW = Options(pose_iterations=0, ik=False, blend=False, limits=False)
-"""As tables 8.1 to 8.4 were measured: what networks say is fed back, nothing corrects it."""
+"""Options of tables 8.1 to 8.4: the networks' output is fed back without corrections."""
 FULL = Options()
-"""As tables 8.5 to 8.8: pose iterations, inverse kinematics, the blend of §7.7.3."""
+"""Options of tables 8.5 to 8.8: pose iterations, inverse kinematics, the blend of section 7.7.3."""
 _OTHERS = ("far_impact", "own_impact", "head", "head_share", "jerk", "bones", "beyond", "seconds", "duration")
-_WITHIN = 1e-3  # radians beyond a limit that are none
+_WITHIN = 1e-3  # radians, tolerance of the joint limits
 LOST = 0.5
-"""m: a motion with a hand or foot farther off than that, on average, has lost its body; no mean says anything of it."""
+"""m: a motion with a hand or foot further off on average has failed and is excluded from all means."""
 WALL = 4.0
-"""m from the thrower to the target that all of his threw at, a square of 3 m (Fredriksson §8.2)."""
-_HALF = 0.02  # frames before and after the release between which the ball's velocity is read
-_LONGEST = 8.0  # s
+"""m from the thrower to the target of all of Fredriksson's throws, a square of 3 m (section 8.2)."""
+_HALF = 0.02  # frames before and after the release between which the ball's velocity is measured
+_LONGEST = 8.0  # s, longest flight
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ThrowFigures:
-    """One motion generated anew.
+    """Figures of one generated motion.
 
-    name, subject: the example's. deviation (4,) m: mean distance of wrists and toes from where they were wanted, of the
-    motion as it comes out. network (4,) m: the same of what the networks said in each frame, before anything corrected
-    it. body (4,) m: as deviation, but of a body with bones of constant length also where the joints of a single network
-    float, which `deviation` follows as his tables do. impact m: from where the ball of the generated motion crosses a
-    wall 4 m from the thrower (§8.2), or meets the ground before, to where the ball of the wanted one does; NaN without
-    a hand that throws. far_impact m: the same where its target is. own_impact m: there, from the wanted ball to the
-    target, which tells what scaling does to a flight. head: degrees between the heads' rotations. head_share: how much
-    the head turns against the chest, over how much the example's does. jerk: the 99th percentile of it over the
-    example's. bones m: by how much the bone that changes most changes. beyond: share of rotations beyond the joints'
-    limits, NaN where the model knows none. seconds: that it took, of `duration` s."""
+    Attributes:
+        name: the example's name.
+        subject: the example's subject.
+        deviation: (4,) m, mean distance of wrists and toes from their targets in the final motion.
+        network: (4,) m, the same for the networks' prediction of each frame, before any correction.
+        body: (4,) m, as deviation, but of a body with bones of constant length also where the joints of a single
+            network are inconsistent, which `deviation` follows as the thesis' tables do.
+        impact: m between the impacts of the generated and the requested ball on a wall 4 m from the thrower (section
+            8.2), or on the ground before; NaN without a hand that throws.
+        far_impact: m, the same at the distance of the target.
+        own_impact: m there, from the requested ball to the target: the effect of scaling on the flight.
+        head: degrees between the heads' rotations.
+        head_share: rotation of the head relative to the chest, divided by the example's.
+        jerk: its 99th percentile, divided by the example's.
+        bones: m, largest change of a bone's length.
+        beyond: share of rotations outside the joint limits, NaN if the model has no limits.
+        seconds: computing time.
+        duration: s of the motion.
+    """
 
     name: str
     subject: str
@@ -80,7 +90,13 @@ class ThrowFigures:
 
 @dataclass(frozen=True, eq=False)
 class Evaluated:
-    """motions: one entry each. options: with which they were generated. left_out: lines, one each."""
+    """Evaluation of a model.
+
+    Attributes:
+        motions: figures of each motion.
+        options: options with which they were generated.
+        left_out: one line for each motion that was left out.
+    """
 
     motions: tuple[ThrowFigures, ...]
     options: Options
@@ -88,21 +104,21 @@ class Evaluated:
 
     @property
     def deviation(self) -> np.ndarray:
-        """(N, 4) m."""
+        """Deviations (N, 4) m of the final motions."""
         return np.array([one.deviation for one in self.motions]).reshape(-1, 4)
 
     @property
     def network(self) -> np.ndarray:
-        """(N, 4) m, before anything corrected it."""
+        """Deviations (N, 4) m before any correction."""
         return np.array([one.network for one in self.motions]).reshape(-1, 4)
 
     @property
     def impact(self) -> np.ndarray:
-        """(N,) m."""
+        """Impact errors (N,) m."""
         return np.array([one.impact for one in self.motions])
 
     def report(self) -> dict:
-        """All of it, as `files.tables` writes it; means are over what are numbers, of motions that kept their body."""
+        """Collect all figures, as `files.tables` writes them; means are over finite values of valid motions."""
         lost = find_lost(self.deviation)
         whole = [one for one, gone in zip(self.motions, lost, strict=True) if not gone]
         impact = self.impact[~lost]
@@ -124,7 +140,7 @@ class Evaluated:
 
 
 def some_of_each(examples: Sequence[Example], motions: int | None) -> list[Example]:
-    """At most so many examples of each subject, evenly taken from all of his; None for all."""
+    """Select at most `motions` examples of each subject, evenly spaced; None for all."""
     if motions is None:
         return list(examples)
     out = []
@@ -138,8 +154,18 @@ def evaluate_throws(
     model: ThrowModel, examples: Sequence[Example], options: Options = FULL, *, by_height: bool = True,
     progress: Callable[[float, str], None] = lambda fraction, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> Evaluated:
-    """The figures of a model on examples at its rate, on any skeletons. by_height: scale what is asked for by the ratio
-    of the model's stature to the example's (§4.5). A motion that cannot be generated is left out and told."""
+    """Evaluate a model on examples at its frame rate, on any skeletons.
+
+    Args:
+        model: the model.
+        examples: the examples.
+        options: options of generation.
+        by_height: scale the description by the ratio of the model's stature to the example's (section 4.5).
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    Returns:
+        The figures; a motion that cannot be generated is left out and listed.
+    """
     found, left_out = [], []
     for order, example in enumerate(examples):
         if cancelled():
@@ -153,7 +179,7 @@ def evaluate_throws(
 
 
 def _measured(model: ThrowModel, example: Example, options: Options, ratio: float) -> ThrowFigures:
-    """One example generated anew and compared."""
+    """Generate one example and measure its figures."""
     description = scaled(describe(example), ratio)
     made = generate(model, description, options=options)
     came = made.predicted if made.floating is not None and not options.ik else made.effectors
@@ -169,11 +195,20 @@ def _measured(model: ThrowModel, example: Example, options: Options, ratio: floa
 
 
 def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, target) -> tuple[float, float, float]:
-    """m between the impacts of the generated and the wanted ball on a wall at his 4 m and at the target, and of the
-    wanted one from the target; NaN for kicks.
+    """Measure the impact errors; NaN for kicks.
 
-    The wanted ball is the example's, scaled, in a hand as large as the model's. shift (T, 4, 3) m: how far from the
-    motion's the effectors are."""
+    The requested ball is the example's, scaled, in a hand as large as the model's.
+
+    Args:
+        motion: the generated motion.
+        shift: (T, 4, 3) m, offset of the effectors from the motion's.
+        example: the example.
+        ratio: scale of the body.
+        target: (3,) m.
+    Returns:
+        m between generated and requested impact at 4 m and at the target, and from the requested impact to the
+        target.
+    """
     if example.limb not in (0, 1):
         return np.nan, np.nan, np.nan
     hand = hand_of(motion, ("left", "right")[example.limb])
@@ -188,8 +223,11 @@ def _impacts(motion: Motion, shift: np.ndarray, example: Example, ratio: float, 
 
 
 def _head(motion: Motion, truth: Motion) -> tuple[float, float]:
-    """Mean angle between the heads' rotations in degrees, and how much the head turns against the chest over how much
-    the true one does; NaN for bodies without a head."""
+    """Measure how the head's rotation differs from the true one; NaN for bodies without a head.
+
+    Returns:
+        Mean angle in degrees, and the head's total rotation relative to the chest divided by the true one.
+    """
     turns, against = [], []
     for one in (motion, truth):
         body = identify(one.skeleton)
@@ -203,17 +241,17 @@ def _head(motion: Motion, truth: Motion) -> tuple[float, float]:
 
 
 def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Angles (N,) in radians between rotations (N, 4)."""
+    """Compute the angles (N,) in radians between rotations (N, 4)."""
     return np.linalg.norm(quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(a), b)), axis=-1)
 
 
 def _jerk(motion: Motion) -> float:
-    """m/s^3: the 99th percentile of the largest jerk of any joint."""
+    """Measure the 99th percentile of the largest jerk (m/s^3) of any joint."""
     return float(np.percentile(jerk(forward_kinematics(motion)[0], motion.fps), 99)) if len(motion) > 3 else np.nan
 
 
 def _bones(model: ThrowModel, made: Generated) -> float:
-    """m by which a bone changes at most: nothing but in a single network, whose joints float."""
+    """Measure the largest change (m) of a bone's length: zero unless a single network's joints are inconsistent."""
     if made.floating is None:
         return 0.0
     joints, parents = chains_of(model.skeleton).joints, model.skeleton.parents
@@ -224,7 +262,7 @@ def _bones(model: ThrowModel, made: Generated) -> float:
 
 
 def _beyond(model: ThrowModel, motion: Motion) -> float:
-    """Share of all rotations that lie beyond the joints' limits."""
+    """Measure the share of all rotations outside the joint limits."""
     if model.joint_limits is None:
         return np.nan
     beyond = JointLimits(model.skeleton, model.joint_limits).beyond(matrices(motion))
@@ -232,20 +270,24 @@ def _beyond(model: ThrowModel, motion: Motion) -> float:
 
 
 def _mean(values) -> float:
-    """The mean of what are numbers; NaN where there are none."""
+    """Compute the mean of the finite values; NaN if there are none."""
     values = np.asarray(values, float)
     values = values[np.isfinite(values)]
     return float(values.mean()) if len(values) else np.nan
 
 
 def deviations(generated: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """(4,) m of one motion: mean distance over its frames; both (T, 4, 3) m in one frame of reference, the effectors
-    in the order left hand, right hand, left foot, right foot."""
+    """Measure the mean distance (4,) m over the frames of one motion.
+
+    Args:
+        generated: (T, 4, 3) m, left hand, right hand, left foot, right foot.
+        requested: (T, 4, 3) m, in the same frame of reference.
+    """
     return np.linalg.norm(np.asarray(generated, float) - np.asarray(wanted, float), axis=-1).mean(axis=0)
 
 
 def find_lost(deviations: np.ndarray) -> np.ndarray:
-    """(N,) bool: which motions of deviations (N, 4) m lost their body."""
+    """Find the motions (N,) bool of deviations (N, 4) m that failed."""
     deviations = np.asarray(deviations, float).reshape(-1, 4)
     return ~np.all(deviations < LOST, axis=-1)
 
@@ -253,10 +295,17 @@ def find_lost(deviations: np.ndarray) -> np.ndarray:
 def let_go(
     motion: Motion, joint: int, grip: np.ndarray, release: float, shift: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Place (3,) m and velocity (3,) m/s at the fractional frame `release` of a ball that a hand joint holds.
+    """Compute how a held ball leaves a hand at a fractional frame.
 
-    grip: (3,) m, the ball's centre in the joint's own axes. shift: (T, 3) m, how far from the motion's the hand is in
-    each frame, for networks whose joints float."""
+    Args:
+        motion: the motion.
+        joint: hand joint.
+        grip: (3,) m, centre of the ball in the joint's own axes.
+        release: fractional frame.
+        shift: (T, 3) m, offset of the hand from the motion's in each frame, for networks with inconsistent joints.
+    Returns:
+        Position (3,) m and velocity (3,) m/s.
+    """
     from scipy.interpolate import CubicSpline
 
     frames = np.clip(release + np.array([-_HALF, 0.0, _HALF]), 0.0, len(motion) - 1)
@@ -268,6 +317,14 @@ def let_go(
 
 
 def find_impact(place: np.ndarray, velocity: np.ndarray, target: np.ndarray, ball: Ball = BASEBALL) -> np.ndarray:
-    """(3,) m: where a ball without spin, let go at `place` (3,) m with velocity (3,) m/s, first crosses the upright
-    plane through the target square to the level line to it, or meets the ground before; NaN where it does neither."""
+    """Find where a ball without spin first crosses the vertical plane through the target or the ground.
+
+    Args:
+        place: (3,) m, start of the ball.
+        velocity: (3,) m/s.
+        target: (3,) m; the plane is perpendicular to the horizontal line to it.
+        ball: kind of ball.
+    Returns:
+        (3,) m; NaN if the ball reaches neither.
+    """
     return find_crossing(fly(Launch(0.0, place, velocity), ball, _LONGEST), target)

@@ -1,10 +1,10 @@
-"""A generated throw or kick joined to the motion around it.
+"""Join a generated throw or kick to the motion around it.
 
     joined = join_throw(run_up.motion, run_up.start, thrown.motion, thrown.release, at=12.4)
 
-Around its release the throw stays bit for bit what was generated, since the ball flies as it left that hand; only its
-first and last parts go over into what surrounds it. It begins on a frame of the motion it is joined to, so the release
-comes up to half a frame sooner or later than asked.
+Around its release the throw stays bit for bit as generated, since the ball flies as it left that hand; only its
+first and last parts are blended with the surrounding motion. It begins on a frame of the motion it is joined to, so
+the release is up to half a frame earlier or later than requested.
 """
 
 from __future__ import annotations
@@ -27,35 +27,40 @@ from ..synthesis.construct.meeting import eased
 from ..synthesis.quality.movement import jerk, uncut_windows, windowed
 
 FADE = 0.5
-"""Seconds in which a throw goes over into what surrounds it, at either end."""
+"""Seconds of the blend between a throw and the surrounding motion, at either end."""
 
 LEAST_KEPT = 0.25
-"""Seconds before and behind the release that are never faded."""
+"""Seconds before and after the release that are never blended."""
 
 EASED = {"throw": 0.8, "kick": FADE}
-"""Seconds of that without a library: time for a step of each foot, where the throw leaves it."""
+"""Seconds of the blend without a library: time for a step of each foot, where the throw allows it."""
 
 TURNING = 2.0
-"""Radians a second at which a body may be turned towards where the throw begins; further apart it takes longer."""
+"""Radians per second at which a body may rotate towards the heading of the throw; larger angles take longer."""
 
-_WAITS = 0.5  # m/s that no joint of a body is as fast as which only stands
+_WAITS = 0.5  # m/s; all joints of a waiting body are slower
 _PERCENT = 99.0
 _usual: weakref.WeakKeyDictionary[Library, dict] = weakref.WeakKeyDictionary()
-_STEPS_BELOW = 2.0  # m/s; who runs takes no small steps
-_FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05  # a throw begins side on
+_STEPS_BELOW = 2.0  # m/s; faster bodies run and take no small steps
+# rad and m above which a warning is reported; a throw begins sideways, so large angles are normal
+_FACES_TELLS, _TURNED_TELLS, _MOVED_TELLS = np.radians(100.0), np.radians(60.0), 0.05
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class JoinedThrow:
     """A longer motion with the throw in it.
 
-    motion: all of it.
-    start: seconds of its first frame on the caller's clock.
-    release: seconds there at which the ball leaves.
-    first, end: frames first .. end of it show the throw from its first to its last.
-    kept: (2,) frames between which it is exactly as generated.
-    moved, turned: (3,) m and rad by which what follows was moved and turned about the vertical to go on from there.
-    warnings: lines for people."""
+    Attributes:
+        motion: the whole motion.
+        start: s of its first frame on the caller's clock.
+        release: s on that clock at which the ball leaves.
+        first: frame with the first frame of the throw.
+        end: frame after the last of the throw.
+        unblended: (2,) frames between which it is exactly as generated.
+        offset: (3,) m by which the following motion was moved to continue from the throw.
+        rotation: rad by which it was rotated about the vertical.
+        warnings: warnings for people.
+    """
 
     motion: Motion
     start: float
@@ -79,24 +84,23 @@ def join_throw(
     """Join a throw to the motion around it.
 
     Args:
-        own: the motion; where it ends sooner than the throw, its ends are held.
+        motion_around: the motion; if it ends before the throw, its ends are held.
         start: s of its first frame.
-        throw: on the same skeleton, where it has to be.
+        throw: the throw on the same skeleton, at its final position.
         release: s in the throw at which the ball leaves.
-        at: s on the clock of `own` at about which that is.
-        goes_on: whether what follows is moved and turned so that it goes on from where the throw ends.
-        fade: s in which the one goes over into the other, at either end.
-
+        at: requested s of the release on the clock of `motion_around`.
+        continues: move and rotate the following motion so that it continues where the throw ends.
+        fade: s of the blend at either end.
     Raises:
-        InputError: there are two skeletons, or the throw is too short.
+        InputError: if the skeletons differ, or the throw is too short.
     """
     if throw.skeleton.names != own.skeleton.names:
-        raise InputError("throw", "the motion of another skeleton", "one on the armature's own skeleton")
+        raise InputError("throw", "a motion of a different skeleton", "a motion of the armature's own skeleton")
     throw = resample(throw, own.fps)
     lead, follow = release, throw.duration - release
     if min(lead, follow) < LEAST_KEPT:
         raise InputError(
-            "throw", f"{lead:.2f} s before and {follow:.2f} s behind the release", f"{LEAST_KEPT:g} s or more of both"
+            "throw", f"{lead:.2f} s before and {follow:.2f} s after the release", f"at least {LEAST_KEPT:g} s of both"
         )
     fps = own.fps
     first = int(round((at - release - start) * fps))
@@ -129,7 +133,11 @@ def join_throw(
 
 
 def hold_ends(own: Motion, start: float, first: int, end: int) -> tuple[Motion, float, int, int]:
-    """The motion with its ends held as long as the throw asks, its start, and the throw's frames in it."""
+    """Extend a motion to the length that the throw requires by holding its ends.
+
+    Returns:
+        The motion, s of its first frame, and first and end frame of the throw in it.
+    """
     if first >= 0 and end <= len(own):
         return own, start, first, end
     added = max(-first, 0)
@@ -139,8 +147,16 @@ def hold_ends(own: Motion, start: float, first: int, end: int) -> tuple[Motion, 
 
 
 def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root (T, 3) m and rotations (T, J, 4) that are `new` where share (T,) is 0 and `old` where it is 1, bit for bit;
-    feet go straight from where the one has them to where the other has them."""
+    """Blend two motions of a body; feet move straight between their two positions.
+
+    Args:
+        skeleton: the skeleton.
+        new: root (T, 3) m and rotations (T, J, 4) of the result where `share` is 0, bit for bit.
+        old: root and rotations of the result where `share` is 1, bit for bit.
+        share: (T,) weight of `old`.
+    Returns:
+        Root (T, 3) m and rotations (T, J, 4).
+    """
     root = new[0] + share[:, None] * (old[0] - new[0])
     rotations = quaternion.slerp(new[1], quaternion.signed_like(old[1], new[1]), share[:, None])
     body, legs = Body.posed(skeleton, root, rotations), identify(skeleton)
@@ -159,7 +175,7 @@ def blend_bodies(skeleton: Skeleton, new, old, share: np.ndarray) -> tuple[np.nd
 
 
 def _heading_apart(own: Motion, frame: int, throw: Motion, shown: int) -> float:
-    """Radians from where `own` faces at its frame to where the throw faces at its."""
+    """Measure the angle (rad) from the heading of `own` at its frame to that of the throw at its frame."""
     angles = []
     for motion, at in ((own, frame), (throw, shown)):
         places, _ = pose_kinematics(motion.skeleton, motion.root_positions[at], motion.rotations[at])
@@ -168,7 +184,7 @@ def _heading_apart(own: Motion, frame: int, throw: Motion, shown: int) -> float:
 
 
 def _continuation(own: Motion, throw: Motion, shown: int, frame: int, end: int) -> tuple[float, np.ndarray]:
-    """Turn (rad) and offset (3,) m that put `own` where the throw is, in the middle of the hand-over."""
+    """Compute rotation (rad) and offset (3,) m that move `own` to the throw in the middle of the blend."""
     middle = (end - frame) // 2
     at, there = min(frame + middle, len(own) - 1), min(shown + middle, len(throw) - 1)
     turn = _heading_apart(own, at, throw, there)
@@ -178,7 +194,7 @@ def _continuation(own: Motion, throw: Motion, shown: int, frame: int, end: int) 
 
 
 def _move_rest(own: Motion, frame: int, turn: float, offset: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Root and rotations of `own` with everything from `frame` on turned and moved."""
+    """Rotate and move everything of `own` from `frame` on; return root and rotations."""
     moved = place(own, turn, offset)
     behind = np.arange(len(own)) >= frame
     return (
@@ -188,35 +204,40 @@ def _move_rest(own: Motion, frame: int, turn: float, offset: np.ndarray) -> tupl
 
 
 def _mean_speed(root: np.ndarray, stretch: tuple[int, int], fps: float) -> float:
-    """m/s over the ground of root (T, 3) m within a stretch, on average."""
+    """Measure the mean speed (m/s) over the ground of root (T, 3) m within a stretch of frames."""
     part = root[stretch[0] : stretch[1], :2]
     return float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean() * fps) if len(part) > 1 else 0.0
 
 
 def _old_share(count: int, first: int, kept: tuple[int, int], end: int) -> np.ndarray:
-    """(count,) share of what surrounds the throw: 0 within `kept`, 1 before its first frame and from its end on."""
+    """Compute the weight (count,) of the surrounding motion.
+
+    It is 0 within `kept`, 1 before the throw's first frame and from its end.
+    """
     at = np.arange(count)
     before, behind = (kept[0] - at) / (kept[0] - first + 1.0), (at - kept[1] + 1) / (end - kept[1] + 1.0)
     return eased(np.maximum(before, behind), np.ones(count))
 
 
 def _turning_warnings(before: float, begin: float, turned: float, moved: np.ndarray, end: float) -> tuple[str, ...]:
+    """Describe large rotations and displacements of the body."""
     told = []
     if abs(before) > _FACES_TELLS:
         told.append(TimedLine(
-            f"{begin:.1f} s: the body faces {abs(np.degrees(before)):.0f} degrees away from where the throw begins and "
-            "is turned there; let it face the target, or give a library", (begin, begin),
+            f"{begin:.1f} s: the body turns {abs(np.degrees(before)):.0f} degrees to the start of the throw; let it "
+            "face the target before, or choose a library for the run-up", (begin, begin),
         ))  # fmt: skip
     if np.linalg.norm(moved[:2]) > _MOVED_TELLS or abs(turned) > _TURNED_TELLS:
         told.append(TimedLine(
-            f"{end:.1f} s: what follows goes on from where the throw ends, {np.degrees(turned):.0f} degrees turned",
+            f"{end:.1f} s: the following motion continues from the end of the throw, rotated by "
+            f"{np.degrees(turned):.0f} degrees",
             (end, end),
         ))  # fmt: skip
     return tuple(told)
 
 
 def stand_still(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0), facing: float = 0.0) -> Motion:
-    """Somebody who only stands, upright, at `spot` (2,) m, facing `facing` rad."""
+    """Build a motion of a body that stands upright at `spot` (2,) m with heading `facing` rad for `seconds` s."""
     stance = neutral_stance(skeleton)
     local = stance.rotations.copy()
     for joint, parent in enumerate(skeleton.parents):
@@ -230,8 +251,15 @@ def stand_still(skeleton: Skeleton, seconds: float, fps: float, spot=(0.0, 0.0),
 
 
 def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Motion, float]:
-    """A throw without the time in which the body only stands, before it winds up and behind it, but for `keeps` s of
-    that at either end; and seconds from its first frame to its release. It is bit for bit what it was elsewhere."""
+    """Cut the time in which the body only stands from both ends of a throw.
+
+    Args:
+        throw: the throw; what is left stays bit for bit.
+        release: s of its release.
+        margin_s: s of standing to keep at either end.
+    Returns:
+        The throw, and s from its first frame to its release.
+    """
     fps = throw.fps
     speed = np.linalg.norm(np.diff(forward_kinematics(throw)[0], axis=0), axis=-1).max(axis=1) * fps
     moves = np.flatnonzero(speed > _WAITS)
@@ -245,16 +273,20 @@ def trim_waiting(throw: Motion, release: float, keeps: float = FADE) -> tuple[Mo
 
 
 def transition_jerk(joined: JoinedThrow) -> np.ndarray:
-    """(2,) m/s^3: the largest third difference of any joint within 8 frames of where the throw is gone over into and
-    out of."""
+    """Measure the jerk (2,) m/s^3 of the transitions into and out of the throw.
+
+    The largest third difference of any joint within 8 frames of the middle of each blend.
+    """
     values = windowed(jerk(forward_kinematics(joined.motion)[0], joined.motion.fps))
     at = 0.5 * np.array([joined.first + joined.kept[0], joined.kept[1] + joined.end])
     return values[np.clip(np.round(at).astype(int) - 2, 0, len(values) - 1)]
 
 
 def library_jerk(library: Library, fps: float, percent: float = _PERCENT) -> float:
-    """m/s^3 that so many per cent of the library's uncut recordings stay below within any 17 frames, at `fps`; worked
-    out once."""
+    """Measure the jerk (m/s^3) that a share of the library's recordings does not exceed.
+
+    `percent` of all windows of 17 frames of uncut recordings, at `fps`; computed once per library.
+    """
     known = _usual.setdefault(library, {})
     if (fps, percent) not in known:
         recorded = [clip.recording for clip in library.clips if not clip.mirrored and not clip.made]

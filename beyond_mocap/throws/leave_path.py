@@ -1,6 +1,6 @@
-"""A body that leaves its own path for a throw some seconds before it, and is back on it some seconds behind.
+"""Leave the own path of a body for a throw some seconds before it, and return to it some seconds after.
 
-The run-up and the recovery come out of a library (`run_up`) for the seconds around the throw; the rest stays as it is.
+Run-up and recovery come from a library (`run_up`) for the seconds around the throw; the rest stays unchanged.
 """
 
 from __future__ import annotations
@@ -21,17 +21,26 @@ from .join_throw import FADE, blend_bodies, hold_ends
 from .run_up import SMOOTH, RunUpResult, construct_run_up
 
 REACH = 4.5
-"""Seconds before and behind a throw in which a body may leave its own path."""
+"""Seconds before and after a throw in which a body may leave its own path."""
 
-_LEAST_STOP = 1.0  # s that a body stops or sets out in, at least
-_SPEEDS_UP = 2.5  # m/s^2 at which a body stops and sets out
-_TOO_FAST = 1.2  # times what the library, or the body itself, shows
+_LEAST_STOP = 1.0  # s, shortest time in which a body stops or starts
+_SPEEDS_UP = 2.5  # m/s^2, acceleration of a body that stops or starts
+_TOO_FAST = 1.2  # warning above this multiple of the speed of the library, or of the body itself
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Stretch:
-    """Frames low .. high of a motion around a throw, which takes first .. end; whether the body comes back to its own
-    path; the motion with its ends held and seconds of its first frame."""
+    """Frames of a motion around a throw.
+
+    Attributes:
+        own_motion: the motion with its ends held.
+        start: s of its first frame.
+        low: first frame that may change.
+        first: first frame of the throw.
+        end: frame after the throw.
+        high: frame after the last that may change.
+        returns: whether the body returns to its own path.
+    """
 
     own: Motion
     start: float
@@ -46,15 +55,21 @@ def leave_path(
     library: Library, own: Motion, start: float, throw: Motion, release: float, *, at: float, action: str = "throw",
     progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None,
 ) -> RunUpResult:
-    """Construct `own` with a run-up to the throw and a recovery out of `library`.
+    """Construct a motion with a run-up to a throw and a recovery from a library.
 
-    The body leaves its own path and comes back to it where both show poses most alike; elsewhere it is as it was, bit
-    for bit. `join_throw` then puts in the throw.
+    The body leaves its own path and returns to it where both have the most similar poses; elsewhere it stays bit for
+    bit. `join_throw` then inserts the throw.
 
     Args:
         library: the clips.
-        own: the body's motion, on the throw's skeleton; its first frame is at `start` s.
-        throw: where it has to be; released at its second `release`, which is at about `at` s.
+        own: the body's motion, on the throw's skeleton.
+        start: s of its first frame.
+        throw: the throw at its final position.
+        release: s in the throw at which the ball leaves.
+        at: approximate s of the release on the clock of `own`.
+        action: "throw" or "kick".
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
     """
     part = _stretch(own, start, throw, release, at)
     around = part.own.frames(part.low, part.high)
@@ -72,7 +87,7 @@ def leave_path(
 
 
 def _stretch(own: Motion, start: float, throw: Motion, release: float, at: float) -> _Stretch:
-    """The frames around a throw; where there is no time to come back, what follows goes on from the throw's end."""
+    """Find the frames around a throw; without time to return, the following motion continues from the throw's end."""
     fps = own.fps
     first = int(round((at - release - start) * fps))
     own, start, first, end = hold_ends(own, start, first - 1, first + len(resample(throw, fps)) + 1)
@@ -84,7 +99,7 @@ def _stretch(own: Motion, start: float, throw: Motion, release: float, at: float
 
 
 def _plan(library: Library, part: _Stretch) -> Plan:
-    """The body's own path around the throw, as a plan."""
+    """Build a plan from the body's own path around the throw."""
     fps = part.own.fps
     times = part.start + np.arange(part.low, part.high) / fps
     path = zero_phase_hann(part.own.root_positions[part.low : part.high, :2], fps, SMOOTH)
@@ -92,7 +107,7 @@ def _plan(library: Library, part: _Stretch) -> Plan:
 
 
 def _edges(part: _Stretch, new: Motion, old: Motion) -> tuple[int, int]:
-    """Frames, from `low` on, at which the body leaves its own path and has come back to it."""
+    """Find the frames, from `low` on, at which the body leaves its own path and has returned to it."""
     count, fade = min(len(new), len(old)), int(FADE * part.own.fps)
     apart = np.linalg.norm(
         forward_kinematics(new)[0][:count] - forward_kinematics(old)[0][:count], axis=-1
@@ -103,7 +118,7 @@ def _edges(part: _Stretch, new: Motion, old: Motion) -> tuple[int, int]:
 
 
 def _blended(part: _Stretch, new: Motion, leaves: int, comes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Root (T, 3) m and rotations (T, J, 4) of the own motion with the new one between its edges."""
+    """Blend the new motion into the own one between its edges; return root (T, 3) m and rotations (T, J, 4)."""
     own, low, fade = part.own, part.low, int(FADE * part.own.fps)
     at, none = np.arange(len(own)) - low, np.zeros(len(own))
     before = (leaves + fade - at) / (fade + 1.0) if low else none
@@ -116,24 +131,25 @@ def _blended(part: _Stretch, new: Motion, leaves: int, comes: int) -> tuple[np.n
 
 
 def _warnings(part: _Stretch, library: Library, root: np.ndarray) -> list[str]:
+    """List warnings about a missing return and a high speed."""
     fps = part.own.fps
     warnings: list[str] = []
     if not part.comes_back:
         when = part.start + part.end / fps
         text = (
-            f"{when:.1f} s: there is no time to get back to the own way: what follows goes on from where the throw ends"
+            f"{when:.1f} s: no time to return to the own path; the following motion continues from the end of the throw"
         )
         warnings.append(TimedLine(text, (when, when)))
     fastest = float(np.linalg.norm(np.diff(root[part.low : part.high, :2], axis=0), axis=1).max() * fps)
     if fastest > _TOO_FAST * max(library.fastest, _easy_speed(part.own)):
         warnings.append(
-            f"the body would have to go at {fastest:.1f} m/s around the throw: choose another frame or target"
+            f"the body has to move at {fastest:.1f} m/s around the throw: choose another frame or target"
         )
     return warnings
 
 
 def is_in_reach(own: Motion, start: float, throw: Motion, release: float, at: float) -> bool:
-    """Whether a body on its own way can be where the throw begins by then, without hurrying much."""
+    """Return whether a body can reach the start of the throw in time from its own path without hurrying much."""
     first = int(np.clip(round((at - release - start) * own.fps), 0, len(own) - 1))
     low = max(first - int(REACH * own.fps), 0)
     away = throw.root_positions[0, :2] - own.root_positions[low, :2]
@@ -141,15 +157,19 @@ def is_in_reach(own: Motion, start: float, throw: Motion, release: float, at: fl
 
 
 def stopping_place(own: Motion, start: float, seconds: float) -> np.ndarray:
-    """(2,) m where a body on its own way comes to a stop at second `seconds`."""
+    """Compute where (2,) m a body on its own path stops at second `seconds`."""
     frame = int(np.clip(round((seconds - start) * own.fps), 0, len(own) - 1))
     spot, way, _ = _stop(own, frame, -1)
     return spot + way
 
 
 def _stop(own: Motion, frame: int, side: int) -> tuple[np.ndarray, np.ndarray, int]:
-    """Where (2,) m the own way is some frames before (side -1) or behind a frame, the way (2,) m on which a body that
-    goes at that speed stops or sets out meanwhile, and how many frames that are."""
+    """Compute how a body stops before a frame (side -1), or starts after it (side 1), at its own speed there.
+
+    Returns:
+        Position (2,) m of the own path some frames before or after, the distance (2,) m covered meanwhile, and the
+        number of frames.
+    """
     fps, places = own.fps, own.root_positions[:, :2]
     second = int(fps)
     near = places[np.clip([frame, frame + side * second], 0, len(own) - 1)]
@@ -161,8 +181,7 @@ def _stop(own: Motion, frame: int, side: int) -> tuple[np.ndarray, np.ndarray, i
 
 
 def _continue_from(own: Motion, end: int, place: np.ndarray) -> Motion:
-    """The motion, everything from frame `end` on moved so that a body which sets out from `place` (2,) m gets into
-    it."""
+    """Move everything from frame `end` on so that a body that starts from `place` (2,) m gets into it."""
     spot, way, _ = _stop(own, min(end, len(own) - 1), 1)
     root = own.root_positions.copy()
     root[end:, :2] += place + way - spot
@@ -170,19 +189,19 @@ def _continue_from(own: Motion, end: int, place: np.ndarray) -> Motion:
 
 
 def _speed_over(away: np.ndarray, frames: int, fps: float) -> float:
-    """m/s that it takes to go `away` (2,) m within so many frames."""
+    """Compute the speed (m/s) that covers `away` (2,) m within a number of frames."""
     return float(np.linalg.norm(away)) * fps / max(frames, 1)
 
 
 def _easy_speed(own: Motion) -> float:
-    """m/s that are not asked too much of a body beside what it does anyway: its usual speed and a little."""
+    """Compute a speed (m/s) that is easy for a body: its usual speed and a little more."""
     step = np.linalg.norm(np.diff(own.root_positions[:, :2], axis=0), axis=1) * own.fps
     usual = float(np.median(step)) if len(step) else 0.0
     return max(min(1.5 * usual, usual + 0.6), 1.6)
 
 
 def _most_alike(apart: np.ndarray, low: int, high: int, fade: int) -> int:
-    """The frame of low .. high from which on two motions, `apart` (T,) m, are most alike for `fade` frames."""
+    """Find the frame of low .. high from which two motions are most similar for `fade` frames; distances (T,) m."""
     low, high = max(low, 0), min(high, len(apart)) - fade
     if high <= low:
         return max(min(low, len(apart) - fade), 0)

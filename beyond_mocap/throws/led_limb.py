@@ -1,8 +1,7 @@
-"""A limb led along the smallest smooth shift of its path that gives it another place and another velocity at one
-instant, and how its end really follows.
+"""Move the path of a limb's end so that it has another position and velocity at one instant.
 
-Of all shifts s(t) that are nothing outside a window, the one with the least integral of |s|^2 + SOFT^4 |s''|^2: it
-swings in and out of itself within some hundredths of a second and has no corner.
+Of all shifts s(t) that are zero outside a window, the one with the smallest integral of |s|^2 + SHIFT_TIME^4 |s''|^2 is
+chosen: it begins and ends within some hundredths of a second without a corner.
 """
 
 from __future__ import annotations
@@ -17,38 +16,46 @@ from ..synthesis.construct.carry import Body, Resting, limb_carried
 from .letting_go import AtFoot, InHand, carried
 
 Hold = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""From local rotations (W, C, 4) of a limb's joints, and from those before they were changed, to those that it can
-have."""
-_NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m, m/s, by which a limb is tried
+"""Function that limits rotations: from local rotations (W, C, 4) of a limb's joints and the original ones to allowed
+ones.
+"""
+_NUDGE = np.array([0.005, 0.005, 0.005, 0.2, 0.2, 0.2])  # m and m/s, steps of numerical derivatives
 SOFT = 0.05
-"""s: how long a shift takes; shorter ones are smaller and more sudden."""
+"""s: time scale of a shift; shorter ones are smaller and more sudden."""
 
 
 @dataclass(frozen=True, eq=False)
 class Shifts:
-    """All smallest shifts about one instant. frames: (N,) int that may be moved. rows: (N, 2): shift of each frame for
-    a place 1 m away, and for a velocity 1 m/s more. cost: (2, 2) m^2 for places (m) and velocities (m/s), per axis."""
+    """All optimal shifts about one instant.
+
+    Attributes:
+        frames: (N,) int, frames that may be moved.
+        rows: (N, 2), shift of each frame for a position offset of 1 m, and for a velocity change of 1 m/s.
+        cost: (2, 2) m^2 for positions (m) and velocities (m/s), per axis.
+    """
 
     frames: np.ndarray
     rows: np.ndarray
     cost: np.ndarray
 
     def of(self, place: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """(N, 3) m: the shifts for another place (3,) m and another velocity (3,) m/s."""
+        """Compute the shifts (N, 3) m for an offset of the position (3,) m and of the velocity (3,) m/s."""
         return self.rows @ np.stack([place, velocity])
 
 
 def shifts_about(at: float, first: int, last: int, fps: float) -> Shifts:
-    """The shifts about the fractional frame `at`, which are nothing before frame `first` and after frame `last`."""
+    """Compute the shifts about the fractional frame `at`, zero before frame `first` and after frame `last`."""
     from scipy.interpolate import CubicSpline
 
     frames = np.arange(first, last + 1)
     count = len(frames)
+    # second differences of the frames, with two zero frames on either side
     second = np.diff(np.eye(count + 4), 2, axis=0)[:, 2:-2] * fps**2
-    usual = 2.0 * np.sqrt(2.0) * SOFT * fps  # so that a place alone costs its square
+    usual = 2.0 * np.sqrt(2.0) * SOFT * fps  # normalisation: a position offset alone costs its square
     energy = (np.eye(count) + SOFT**4 * second.T @ second) / usual
     padded = np.arange(first - 2, last + 3)
     spline = CubicSpline(padded, np.eye(len(padded)))
+    # rows that evaluate the shift's spline and its derivative at `at`; the optimum satisfies both as constraints
     tells = np.stack([spline(at), fps * spline(at, 1)])[:, 2:-2]
     spread = np.linalg.solve(energy, tells.T)
     cost = np.linalg.inv(tells @ spread)
@@ -57,8 +64,16 @@ def shifts_about(at: float, first: int, last: int, fps: float) -> Shifts:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LedLimb:
-    """A motion whose limb is led along shifted paths: `window`, the body at the frames of the shifts, and its limb as
-    it rests. hold: keeps joints within their limits, None where they have none."""
+    """A motion whose limb follows shifted paths.
+
+    Attributes:
+        motion: the motion.
+        part: hand or foot that releases the ball.
+        shifts: possible shifts.
+        window: the body in the frames of the shifts.
+        limb: its limb at rest.
+        limit_rotations: limits the joints, None if they have no limits.
+    """
 
     motion: Motion
     part: InHand | AtFoot
@@ -69,14 +84,14 @@ class LedLimb:
 
     @classmethod
     def of(cls, motion: Motion, part: InHand | AtFoot, shifts: Shifts, hold: Hold | None = None) -> LedLimb:
-        """The limb of a motion."""
+        """Build the limb of a motion."""
         first, last = shifts.frames[0], shifts.frames[-1] + 1
         body = Body.posed(motion.skeleton, motion.root_positions[first:last], motion.rotations[first:last])
         return cls(motion=motion, part=part, shifts=shifts, window=body, limb=Resting.of(body, part.chain(motion)),
                    hold=hold)
 
     def shifted(self, change: np.ndarray) -> Motion:
-        """The motion with another place and velocity (6,) of the part at the release."""
+        """Shift the limb by a change (6,) of position (m) and velocity (m/s) at the release; return the motion."""
         if not np.any(change):
             return self.motion
         rotations = self.motion.rotations.copy()
@@ -88,8 +103,16 @@ class LedLimb:
         return replace(self.motion, rotations=rotations)
 
     def follows(self, change: np.ndarray, frame: float, points, velocities) -> tuple[np.ndarray, np.ndarray]:
-        """(6, K, 3) each: by how much the part's points and their velocities really move for each m and m/s that is
-        asked of them, beside a change (6,) that brings them to `points` and `velocities` (1, K, 3)."""
+        """Measure how the limb really responds to requested changes.
+
+        Args:
+            change: (6,) present change.
+            frame: fractional frame of the release.
+            points: (1, K, 3) m with that change.
+            velocities: (1, K, 3) m/s with that change.
+        Returns:
+            Derivatives (6, K, 3) of points and velocities with respect to each requested m and m/s.
+        """
         found = []
         for number, nudge in enumerate(np.diag(_NUDGE)):
             near = carried(self.part, self.shifted(change + nudge), np.array([frame]))
@@ -98,6 +121,6 @@ class LedLimb:
 
 
 def at_once(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """`LedLimb.follows` of K points that do just what is asked."""
+    """Return the derivatives of `ShiftedLimb.measure_response` for K points that follow exactly."""
     both = np.repeat(np.eye(6)[:, None, :], count, axis=1)
     return both[..., :3], both[..., 3:]

@@ -1,5 +1,7 @@
-"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md): a zip of plain arrays,
-with one JSON text for what is no array. Nothing in it is ever executed."""
+"""MODEL.npz: a trained model of throws or kicks as a file (docs/throws/throws-training.md).
+
+A zip of plain arrays, with one JSON text for everything else. Nothing in it is ever executed.
+"""
 
 from __future__ import annotations
 
@@ -25,28 +27,30 @@ from .networks.model import ModelSettings, ThrowModel
 from .networks.network import PhaseNetwork
 
 WEIGHTS = Path(__file__).parent / "networks" / "weights"
-"""Where the weights that come with the project lie, one file an action."""
+"""Folder of the weights that are part of the project, one file per action."""
 VERSION = 1
 FORMAT = "Beyond Mocap throw model"
 LARGEST = 300_000_000
-"""Bytes of a file above which it is no model."""
+"""Largest size of a file, bytes."""
 UNPACKED = 1_000_000_000
-"""Bytes of all its arrays together above which it is no model."""
+"""Largest size of all arrays together, bytes."""
 _KIND = "a file of weights (.npz)"
 _PAGE = "docs/throws/throws-training.md"
 _SCALES = ("input_mean", "input_scale", "output_mean", "output_scale")
 _BEYOND = ("before", "after")
-_OTHERS = {"told": "the checkpoint of a training"}
+_OTHERS = {"told": "the checkpoint of a training"}  # array that identifies another kind of file
 _FLOATS = tuple(np.dtype(name) for name in ("<f2", "<f4", "<f8"))
 _ROWS = ("format", "version", "settings", "skeleton", "stature", "leg_reach", "trained_on", "notes", "examples")
 _EXAMPLE = ("name", "subject", "limb", "release", "impact", "launch", "stature")
 
 
 def read_model(path: str | os.PathLike) -> ThrowModel:
-    """The model that a file holds; float16 weights come as float32.
+    """Read a model from a file; float16 weights become float32.
 
-    InputError, one line that begins with the file's name, for whatever is wrong: missing, cut short, of something else,
-    a value that is no number, shapes that do not fit."""
+    Raises:
+        InputError: one line that begins with the file's name, for every fault: missing, truncated, another kind of
+            file, NaN or infinite values, shapes that do not match.
+    """
     data = content(path, _KIND, LARGEST)
     try:
         arrays = plain_arrays(data, _KIND, _FLOATS, UNPACKED, _OTHERS)
@@ -58,18 +62,25 @@ def read_model(path: str | os.PathLike) -> ThrowModel:
 
 @lru_cache(maxsize=4)
 def shipped_model(action: str) -> ThrowModel:
-    """The model of "throw" or "kick" that comes with the project. InputError where it is missing."""
+    """Read the model of "throw" or "kick" that is part of the project; InputError if it is missing."""
     path = WEIGHTS / f"{action}.npz"
     if not path.is_file():
-        raise InputError(path, "no such weights", "weights of this action", "train some: beyond-mocap throw train")
+        raise InputError(path, "no such file", "weights of this action",
+                         "train a model with beyond-mocap throw train")  # fmt: skip
     return read_model(path)
 
 
 def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) -> None:
-    """Write a model as `read_model` reads it, number for number; the same model gives the same bytes.
+    """Write a model so that `read_model` reads the same numbers; the same model gives the same bytes.
 
-    half: weights and the examples' rotations as float16 and all else as float32, a quarter of the size: for weights
-    that are shipped. InputError where it cannot be written, or where a weight is too large for float16."""
+    Args:
+        model: the model.
+        path: the file.
+        half: write weights and the examples' rotations as float16 and all else as float32, a quarter of the size;
+            used for the weights that are part of the project.
+    Raises:
+        InputError: if the file cannot be written, or a weight is too large for float16.
+    """
     arrays = {HEADER: np.frombuffer(json.dumps(_header(model), allow_nan=False).encode(), np.uint8)}
     arrays |= {"offsets": model.skeleton.offsets, "end_offsets": model.skeleton.end_offsets}
     arrays |= {name: one for name in ("joint_limits", "reference") if (one := getattr(model, name)) is not None}
@@ -82,6 +93,7 @@ def write_model(model: ThrowModel, path: str | os.PathLike, half: bool = False) 
 
 
 def _header(model: ThrowModel) -> dict:
+    """Build the JSON header of a model."""
     skeleton = model.skeleton
     return {
         "format": FORMAT, "version": VERSION, "settings": asdict(model.settings),
@@ -94,6 +106,7 @@ def _header(model: ThrowModel) -> dict:
 
 
 def _example_out(example: Example) -> dict:
+    """Convert the values of an example to JSON."""
     return {
         "name": example.name, "subject": example.subject, "limb": int(example.limb), "release": float(example.release),
         "impact": [float(one) for one in example.impact],
@@ -103,6 +116,7 @@ def _example_out(example: Example) -> dict:
 
 
 def _networks_out(model: ThrowModel) -> dict:
+    """Collect the arrays of all networks by name."""
     out = {}
     for name, network in model.networks.items():
         for layer, (weight, bias) in enumerate(zip(network.weights, network.biases)):
@@ -112,6 +126,7 @@ def _networks_out(model: ThrowModel) -> dict:
 
 
 def _examples_out(model: ThrowModel) -> dict:
+    """Collect the arrays of all examples by name."""
     out = {}
     for i, example in enumerate(model.examples):
         out |= {f"examples/{i}/root": example.motion.root_positions, f"examples/{i}/turns": example.motion.rotations}
@@ -121,21 +136,23 @@ def _examples_out(model: ThrowModel) -> dict:
 
 
 def _halved(name: str, values: np.ndarray) -> np.ndarray:
-    """float16 where little hangs on the last digits, else float32."""
+    """Convert to float16 where the last digits do not matter, otherwise to float32."""
     if not ("/weights/" in name or name.endswith("/turns")):
         return values.astype(np.float32)
     if np.abs(values).max(initial=0.0) > np.finfo(np.float16).max:
-        raise InputError(name, "a weight above 65504", "weights that float16 holds", "write it without half")
+        raise InputError(name, "a weight above 65504", "weights in the range of float16",
+                         "write it with full precision")  # fmt: skip
     return values.astype(np.float16)
 
 
 def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
-    """The model that arrays make; every array is used once, none is left over."""
+    """Build the model from arrays; every array is used once, none is left over."""
     header = object_of(header_text(arrays, _PAGE), HEADER, _PAGE)
     if not isinstance(header, dict) or header.get("format") != FORMAT:
-        raise InputError(HEADER, "no throw model", _KIND, "choose another file")
+        raise InputError(HEADER, "not a throw model", _KIND, "choose another file")
     if header.get("version") != VERSION:
-        raise InputError("version", shown(header.get("version")), str(VERSION), "it is of another Beyond Mocap")
+        raise InputError("version", shown(header.get("version")), str(VERSION),
+                         "use the Beyond Mocap version that wrote it")  # fmt: skip
     check_names(header, HEADER, _ROWS, _ROWS)
     names = [field.name for field in fields(ModelSettings)]
     check_names(header["settings"], "settings", names, [name for name in names if name not in ("guided", "carried")])
@@ -149,11 +166,12 @@ def _model(arrays: dict[str, np.ndarray]) -> ThrowModel:
                        reference=arrays.pop("reference", None), trained_on=text(header["trained_on"], "trained_on"),
                        notes=tuple(text(one, "notes") for one in entries(header["notes"], "notes")))  # fmt: skip
     if arrays:
-        raise InputError("the arrays", f"{next(iter(arrays))[:40]!r}, which belongs to nothing", f"those of {_PAGE}")
+        raise InputError("the arrays", f"an unknown array {next(iter(arrays))[:40]!r}", f"the arrays of {_PAGE}")
     return model
 
 
 def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
+    """Build the skeleton from its JSON row and arrays."""
     known = ("names", "parents", "end_parents")
     check_names(row, "skeleton", known, known)
     names = [text(one, "skeleton: names") for one in entries(row["names"], "skeleton: names")]
@@ -166,11 +184,13 @@ def _skeleton(row, arrays: dict[str, np.ndarray]) -> Skeleton:
 
 
 def _reach(row) -> dict[str, tuple]:
+    """Parse the leg reach of both legs."""
     check_names(row, "leg_reach", ("left", "right"), ("left", "right"))
     return {side: numbers(pair, f"leg_reach: {side}", 2, "[shortest, longest] metres") for side, pair in row.items()}
 
 
 def _network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetwork:
+    """Build a network from its arrays."""
     weights = tuple(_taken(arrays, f"{name}/weights/{layer}") for layer in range(layers))
     biases = tuple(_taken(arrays, f"{name}/biases/{layer}") for layer in range(layers))
     try:
@@ -180,6 +200,7 @@ def _network(name: str, layers: int, arrays: dict[str, np.ndarray]) -> PhaseNetw
 
 
 def _example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str, np.ndarray]) -> Example:
+    """Build example `i` from its JSON row and arrays."""
     where = f"example {i + 1}"
     check_names(row, where, _EXAMPLE, _EXAMPLE)
     root, turns = _taken(arrays, f"examples/{i}/root"), _taken(arrays, f"examples/{i}/turns")
@@ -203,10 +224,10 @@ def _example(i: int, row, skeleton: Skeleton, fps: float, arrays: dict[str, np.n
 
 
 def _taken(arrays: dict[str, np.ndarray], name: str, shape: tuple[int, ...] | None = None) -> np.ndarray:
-    """An array out of those that are left, which it leaves. InputError where it is missing or has another shape."""
+    """Remove an array from those that are left and return it; InputError if it is missing or has another shape."""
     array = arrays.pop(name, None)
     if array is None:
-        raise InputError("the arrays", f"no {name!r}", f"those of {_PAGE}", "copy it again or choose another file")
+        raise InputError("the arrays", f"no {name!r}", f"the arrays of {_PAGE}", "copy it again or choose another file")
     if shape is not None and array.shape != shape:
         raise InputError(name, f"shape {array.shape}", str(shape))
     return array

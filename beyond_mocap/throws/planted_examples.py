@@ -1,11 +1,12 @@
-"""Synthetic throws and kicks whose targets are known: the truth that networks are trained and tested on, in folders.
+"""Synthetic throws and kicks with known targets: ground truth on which networks are trained and tested, in folders.
 
-For each subject a folder of BVH files with their words (`NAME.txt`), and over all of them `throws.csv`, which says who
-threw with what, when the ball left, how fast, and through which point it flew. The ball flies through air, so the point
-is where it truly went.
+For each subject a folder of BVH files with their labels (`NAME.txt`), and for all of them `throws.csv`, with
+subject, limb, release time, speed and the point that the ball flew through. The ball flies through air, so the point
+is its true position.
 
-A kick is aimed as people aim: the whole approach turns to the target, a harder kick is swung faster, and the ball rises
-as the foot (of `synthetic.kicks`) meets it lower or with its toes less down (`letting_go.strike_ball`).
+A kick is aimed as people aim: the whole approach is rotated to the target, a harder kick is swung faster, and the
+ball rises as the foot (of `synthetic.kicks`) strikes it lower or with its toes less down
+(`ball_release.strike_ball`).
 """
 
 from __future__ import annotations
@@ -39,23 +40,33 @@ from .throw_records import LAUNCH, TABLE_NAME, TARGET
 
 COLUMNS = ("file", "subject", "limb", "release_s", *TARGET, "speed_m_s", *LAUNCH, "ball_x_m", "ball_y_m", "ball_z_m")
 RATE = 120.0
-_TRIES = 50
-_INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside serves, and how often
+"""Frames per second of the files."""
+_TRIES = 50  # random targets that are tried
+_INSIDE = (17.0, 1.2, 0.7)  # m/s and m up to which the inside of the foot is used, and its probability
 SLOWEST, FASTEST = 6.0, 36.0
-"""m/s of a ball."""
-_CLEAR = 0.05  # m that the toe joint is above the ground at the contact of an instep kick
-_AT_INSIDE = 0.35  # where along the foot, from ankle to toe joint, the inside meets the ball
-_STEEP = 0.5  # sine of the foot's slope above which it is an instep's
-_LOFTS = np.linspace(-16.0, 20.0, 5)  # degrees, tried for an instep kick
-_LIFTS = np.linspace(0.05, -0.03, 5)  # m, tried for one with the inside
-_ROUNDS = 6
-_HIT = 0.01  # m, near enough
+"""Range of the ball speed, m/s."""
+_CLEAR = 0.05  # m, height of the toe joint above the ground at the contact of an instep kick
+_AT_INSIDE = 0.35  # share of the foot, from ankle to toe joint, at which the inside strikes the ball
+_STEEP = 0.5  # sine of the foot's slope above which the kick is an instep kick
+_LOFTS = np.linspace(-16.0, 20.0, 5)  # degrees, sampled for an instep kick
+_LIFTS = np.linspace(0.05, -0.03, 5)  # m, sampled for a kick with the inside
+_ROUNDS = 6  # iterations with interpolated launches before exact ones
+_HIT = 0.01  # m, tolerance of a hit
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Planted:
-    """A made throw or kick: motion, limb as in `throws.csv`, release s, position (3,) m and velocity (3,) m/s of the
-    ball as it leaves, impact (3,) m where it flies through, words."""
+    """A synthetic throw or kick.
+
+    Attributes:
+        motion: the motion.
+        limb: as in `throws.csv`.
+        release: s at which the ball leaves.
+        position: (3,) m of the ball at the release.
+        velocity: (3,) m/s of the ball at the release.
+        impact: (3,) m, point that the ball flies through.
+        labels: labels of the clip.
+    """
 
     motion: Motion
     limb: str
@@ -67,7 +78,7 @@ class Planted:
 
 
 def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
-    """A throw of this subject at some target 5 to 26 m away and up to 2.4 m high."""
+    """Generate a throw of a subject at a random target 5 to 26 m away and up to 2.4 m high."""
     target, speed = _throw_order(thrower.fastest, chance)
     made = make_throw(thrower, target, speed, chance, fps)
     impact, _ = meet_wall(made.position, made.velocity, BASEBALL, np.array([target[0], 0.0]), np.eye(2)[0])
@@ -77,8 +88,10 @@ def planted_throw(thrower: Person, chance: np.random.Generator, fps: float = RAT
 
 
 def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) -> Planted:
-    """A kick of this subject at some place of a goal 8 to 22 m away; of the slower ones many with the inside of the
-    foot."""
+    """Generate a kick of a subject at a random point of a goal 8 to 22 m away.
+
+    Slower kicks are often with the inside of the foot.
+    """
     for _ in range(_TRIES):
         target = chance.uniform((8.0, -3.4, 0.3), (22.0, 3.4, 2.2))
         speed = float(chance.uniform(12.0, who.fastest))
@@ -91,11 +104,11 @@ def planted_kick(who: Person, chance: np.random.Generator, fps: float = RATE) ->
         words = f"kick {made.foot} low {'inside' if inside else 'top'} running"
         return Planted(motion=made.motion, limb=f"{made.foot}_foot", release=made.contact, position=made.ball,
                        velocity=made.velocity, impact=target, words=words)
-    raise InputError("planted kicks", f"{who.name} with {who.fastest:g} m/s", "one who reaches a goal")
+    raise InputError("synthetic kicks", f"{who.name} with {who.fastest:g} m/s", "a performer who reaches a goal")
 
 
 def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[float, float, float], float]:
-    """A target (3,) m ahead and a speed m/s that reaches it on a flat arc."""
+    """Choose a target (3,) m ahead and a speed (m/s) that reaches it on a flat arc."""
     for _ in range(_TRIES):
         ahead, up = float(chance.uniform(5.0, 26.0)), float(chance.uniform(0.1, 2.4))
         speed = float(chance.uniform(13.0, fastest))
@@ -103,18 +116,22 @@ def _throw_order(fastest: float, chance: np.random.Generator) -> tuple[tuple[flo
         least = np.sqrt(GRAVITY * (rise + np.hypot(rise, ahead)))
         if speed > 1.3 * least:
             return (ahead, 0.0, up), speed
-    raise InputError("planted throws", f"a fastest throw of {fastest:g} m/s", "one of more than 20 m/s")
+    raise InputError("synthetic throws", f"a fastest throw of {fastest:g} m/s", "more than 20 m/s")
 
 
 def planted(action: str, seed: int, order: int) -> tuple[str, Planted]:
-    """The name of the subject of that seed, and its throw (or kick) number `order`, somewhere on the ground."""
+    """Generate throw (or kick) number `order` of the subject of a seed, anywhere on the ground.
+
+    Returns:
+        The subject's name, and the example.
+    """
     make, person = ACTIONS[action]
     who, chance = person(seed), np.random.default_rng([seed, order, 40])
     return who.name, _elsewhere(make(who, chance), chance)
 
 
 def _elsewhere(made: Planted, chance: np.random.Generator) -> Planted:
-    """The same somewhere else on the ground, turned by any angle."""
+    """Move and rotate an example on the ground by random amounts."""
     angle, away = float(chance.uniform(-np.pi, np.pi)), np.append(chance.uniform(-20.0, 20.0, 2), 0.0)
     turn = quaternion.about_up(np.array(angle))
     position, velocity, impact = (quaternion.rotate(turn, v) for v in (made.position, made.velocity, made.impact))
@@ -126,10 +143,21 @@ def write_planted(
     folder: Path, action: str, subjects: int, count: int, seed: int = 0,
     progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> int:
-    """Makes `count` throws (or kicks, by `action`) of each of `subjects` people in `folder`; how many there are then.
+    """Write throws or kicks of synthetic subjects to a folder, completely or not at all.
 
-    The folder comes whole or not at all. seed: of the first subject, the others follow. InputError where the folder has
-    files, or cannot be written."""
+    Args:
+        folder: new or empty folder.
+        action: "throw" or "kick".
+        subjects: number of subjects.
+        count: number of throws or kicks of each.
+        seed: of the first subject; the others follow.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    Returns:
+        The number of files.
+    Raises:
+        InputError: if the folder has files or cannot be written.
+    """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
     with whole_folder(folder) as part:
@@ -146,7 +174,7 @@ def write_planted(
 
 
 def _written(folder: Path, who: str, name: str, example: Planted) -> str:
-    """Writes one example; its row of the table."""
+    """Write one example; return its row of the table."""
     place_of = folder / who
     place_of.mkdir(exist_ok=True)
     bvh.write(place_of / f"{name}.bvh", example.motion)
@@ -159,15 +187,21 @@ def _written(folder: Path, who: str, name: str, example: Planted) -> str:
 
 
 ACTIONS = {"throw": (planted_throw, make_thrower), "kick": (planted_kick, make_kicker)}
-"""action -> who makes one of somebody's examples by chance, and who makes somebody by seed."""
+"""action -> function that generates an example of a subject at random, and function that creates a subject by seed."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Kick:
-    """A made kick.
+    """A synthetic kick.
 
-    motion: the body. contact: s at which the foot meets the ball. foot: "left" or "right". ball: (3,) m, where the
-    ball's centre lies until then. velocity: (3,) m/s and spin: (3,) rad/s, as it leaves."""
+    Attributes:
+        motion: the body.
+        contact: s at which the foot strikes the ball.
+        foot: "left" or "right".
+        ball: (3,) m, centre of the ball until then.
+        velocity: (3,) m/s of the ball at the release.
+        spin: (3,) rad/s of the ball at the release.
+    """
 
     motion: Motion
     contact: float
@@ -181,18 +215,26 @@ def kick(
     target: tuple[float, float, float] = (11.0, 0.0, 1.0), speed: float = 20.0, foot: str = "right",
     style: str | KickStyle = "instep", skeleton: Skeleton | None = None, fps: float = 120.0, ball: Ball = FOOTBALL,
 ) -> Kick:
-    """A kick out of three steps of a ball that lies at the origin, through `target` (3,) m.
+    """Generate a kick with a three-step approach of a ball at the origin.
 
-    speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
-    adult. style: a name of KICKS, or somebody's own. InputError for a target out of reach at that speed, an unknown
-    foot or style."""
+    Args:
+        target: (3,) m, point that the ball flies through.
+        speed: m/s of the ball at the release.
+        foot: "left" or "right".
+        style: a name of KICKS, or a custom style.
+        skeleton: any humanoid skeleton, default the project's adult.
+        fps: frames per second.
+        ball: kind of ball.
+    Raises:
+        InputError: if the target is out of reach at that speed, or foot or style are unknown.
+    """
     how = choose_style("kick", foot, "foot", style=style, styles=KICKS, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     return _Aim(how, neutral, foot, ball).at(np.asarray(target, dtype=float), speed, fps)
 
 
 class _Aim:
-    """What one way of kicking can do with a ball: launches along +X by how the foot meets it."""
+    """Launches along +X that a style of kicking can reach, by how the foot strikes the ball."""
 
     def __init__(self, style: KickStyle, neutral: Neutral, foot: str, ball: Ball):
         self.style, self.neutral, self.foot, self.ball = style, neutral, foot, ball
@@ -204,13 +246,15 @@ class _Aim:
         self.rising, self.ways, self.launches = rising[order], self.ways[order], launches[order]
 
     def _cleared(self, lofts: np.ndarray) -> np.ndarray:
-        """Ways (N, 2) (lift, loft) with the toes just over the ground."""
+        """Build (lift, loft) pairs (N, 2) with the toes just above the ground."""
         ends, _ = contact(self.style, self.neutral, self.foot, [(0.0, loft) for loft in lofts])
         return np.stack([(_CLEAR - ends[:, 1, 2]) / (self.neutral.leg / LEG), lofts], axis=-1)
 
     def launches_of(self, ways: np.ndarray) -> np.ndarray:
-        """The ball's place m, velocity m/s and spin rad/s (N, 9) at the table's pace, in ways (N, 2) of (lift,
-        loft)."""
+        """Compute the ball's position m, velocity m/s and spin rad/s (N, 9) for (lift, loft) pairs (N, 2).
+
+        They are those of the style's own pace.
+        """
         ends, velocities = contact(self.style, self.neutral, self.foot, ways)
         middle = velocities.mean(axis=1)
         centre = np.stack([_touching(*each, self.ball.radius) for each in zip(ends, middle)])
@@ -218,12 +262,13 @@ class _Aim:
         return np.concatenate([centre, found.velocity, found.spin], axis=-1)
 
     def at(self, target: np.ndarray, speed: float, fps: float) -> Kick:
-        """The kick whose ball flies through the target, the ball at the origin."""
+        """Generate the kick whose ball flies through the target, the ball at the origin."""
         away = float(np.hypot(target[0], target[1]))
         start = np.array([0.0, 0.0, self.ball.radius])
         fallen = 0.5 * self.ball.gravity * (away / speed) ** 2
         up, side = float(np.arctan2(target[2] - self.ball.radius + fallen, away)), 0.0
         near = False
+        # correct elevation and direction by the miss; interpolated launches first, exact ones near the solution
         for number in range(_ROUNDS + 2):
             way = interpolate(up, self.rising, self.ways)
             exact = near or number >= _ROUNDS
@@ -241,7 +286,7 @@ class _Aim:
         if np.linalg.norm(met - target) > 5.0 * _HIT:
             raise InputError(
                 "kick", f"a ball of {speed:g} m/s passes the target by {np.linalg.norm(met - target):.2f} m",
-                "a target that it can reach", "kick faster, or aim lower or nearer",
+                "a target within reach", "choose a higher speed, or a lower or nearer target",
             )
         motion = kicked(self.style, self.neutral, self.foot, lift=way[0], loft=way[1], rate=rate, turn=turn, fps=fps)
         back = start - quaternion.rotate(quaternion.about_up(np.array(turn)), centre)
@@ -250,14 +295,16 @@ class _Aim:
 
 
 def _slopes(ends: np.ndarray) -> np.ndarray:
-    """Sines (N,) of how steeply feet with ends (N, 2, 3) point down."""
+    """Compute the sines (N,) of the downward slope of feet with ends (N, 2, 3)."""
     return (ends[:, 0, 2] - ends[:, 1, 2]) / np.linalg.norm(ends[:, 0] - ends[:, 1], axis=-1)
 
 
 def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarray:
-    """The centre (3,) m of a ball on the ground that the foot's line (2, 3) m touches as it comes with `velocity` (3,).
+    """Compute the centre (3,) m of a ball on the ground that a foot touches.
 
-    A foot that points down meets it where its line is square to where it goes; a level one with its inside."""
+    The foot's line (2, 3) m moves with `velocity` (3,) m/s. A foot that points down strikes where its line is
+    perpendicular to its velocity; a level one with its inside.
+    """
     line = ends[1] - ends[0]
     along, far = line / np.linalg.norm(line), FOOT_RADIUS + radius
     normal = velocity - velocity @ along * along
@@ -275,8 +322,11 @@ def _touching(ends: np.ndarray, velocity: np.ndarray, radius: float) -> np.ndarr
 
 
 def _rising_to(point: np.ndarray, normal: np.ndarray, along: np.ndarray, height: float, far: float) -> np.ndarray:
-    """The unit vector (3,) square to `along` (or free, where that is zero) by which `point` is `far` m from a centre at
-    `height` m, as near to `normal` as may be."""
+    """Rotate a normal so that a ball at `height` m touches the foot.
+
+    Returns the unit vector (3,) perpendicular to `along` (or free, if that is zero) for which `point` is `far` m
+    from a centre at `height` m, as near to `normal` as possible.
+    """
     up = np.array([0.0, 0.0, 1.0]) - along[2] * along
     level = normal - normal @ up / (up @ up) * up
     level /= np.linalg.norm(level)

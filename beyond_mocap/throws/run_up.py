@@ -1,10 +1,10 @@
-"""The run-up to a generated throw and the recovery from it, out of a library.
+"""Run-up to a generated throw and recovery from it, constructed from a library.
 
     run_up = construct_run_up(library, plan, thrown.motion, thrown.release, 12.4, action="throw")
 
-The throw becomes a clip of the library, in memory, whose key moment is the release. The player's track is led through
-the place where the throw is, for the target is aimed at from there, and the search finds the way in and out. The exact
-throw is then put in by `join_throw`.
+The throw becomes a clip of the library, in memory, whose key moment is the release. The player's track is led
+through the position of the throw, since the throw is aimed from there, and the search finds the motion before and
+after it. `join_throw` then inserts the exact throw.
 """
 
 from __future__ import annotations
@@ -38,21 +38,21 @@ from ..synthesis.search.wanted import Wanted, build_order
 from ..synthesis.search_library import search_library
 
 OWN_WORD = "generated"
-"""The word that only the generated clip carries."""
+"""The label that only the generated clip has."""
 
 ACTIONS = {action: labels.list_labels(action=action, is_root=True)[:1] for action in labels.ACTIONS}
-"""What a network does -> the label of the key moment in which it does it."""
+"""Action of a model -> label of the key moment in which it happens."""
 
 SMOOTH = 0.7
-"""Seconds of the window that takes the sway out of a body's own path."""
+"""Seconds of the window that removes the sway from a body's own path."""
 
 EDGE = 0.1
-"""Seconds at either end of the generated clip that serve its transitions."""
+"""Seconds at either end of the generated clip that are used for its transitions."""
 
 _CLIP = "generated throw"
-_ENDS = 0.5  # s at either end of a stretch that faces as the motion around it
-_CATCH_UP = 0.8  # m/s by which the track is left behind or caught up with
-_LEADS = (1.0, 4.0)  # s that leading the track to the throw and back takes, at least and at most
+_ENDS = 0.5  # s at either end of a stretch with the heading of the surrounding motion
+_CATCH_UP = 0.8  # m/s, speed difference to the track on the detour to the throw
+_LEADS = (1.0, 4.0)  # s, shortest and longest duration of the detour to the throw and back
 
 Progress = Callable[[float, str], None]
 
@@ -61,10 +61,12 @@ Progress = Callable[[float, str], None]
 class RunUpResult:
     """A player's motion around a throw, on the throw's own skeleton.
 
-    motion: all of it.
-    start: seconds of its first frame on the track's clock.
-    seams: frames that begin another clip.
-    warnings: lines for people."""
+    Attributes:
+        motion: the whole motion.
+        start: s of its first frame on the track's clock.
+        transitions: frames at which another clip begins.
+        warnings: warnings for people.
+    """
 
     motion: Motion
     start: float
@@ -80,16 +82,17 @@ def construct_run_up(
 
     Args:
         library: the clips.
-        plan: what the player is asked; its track is led through the throw, and its key moments that, by their solved
-            touches, lie within the throw are left out, with a warning.
-        throw: where it has to be on the pitch, on any humanoid skeleton.
+        plan: plan of the player; its track is led through the throw, and key moments whose resolved touches lie
+            within the throw are left out, with a warning.
+        throw: the throw at its final position on the pitch, on any humanoid skeleton.
         release: s in the throw at which the ball leaves.
-        at: s on the track's clock.
+        at: s of the release on the track's clock.
         action: one of ACTIONS.
-        between: the motion that it comes from and goes back to, frame for frame: it faces as that does at either end.
-
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+        between: motion before and after, frame for frame: the result has its heading at either end.
     Raises:
-        InputError: the throw lies outside the track.
+        InputError: if the throw lies outside the track.
     """
     from threadpoolctl import threadpool_limits
 
@@ -109,7 +112,7 @@ def construct_run_up(
         order = _order(more, resolved)
         search = PathSearch(more, order, balanced(plan.alpha), lambda done, text: report(0.8 * done, text), cancelled)
         edit = search.run()
-        report(0.8, "Laying out")
+        report(0.8, "Constructing")
         construction = _construction(more, resolved, order, edit, _heading_of(own, at - release, between))
         planted, _ = construction.lay_out()
     motion = Motion(bones, planted.root * size, planted.rotations, plan.fps)
@@ -120,16 +123,17 @@ def construct_run_up(
 
 
 def _check(plan: Plan, throw: Motion, begin: float) -> None:
+    """Raise InputError if the throw lies outside the track."""
     finish, times = begin + throw.duration, plan.track.times
     if begin < times[0] - 0.5 / plan.fps or finish > times[-1] + 0.5 / plan.fps:
         raise InputError(
             "throw", f"from {begin:.2f} to {finish:.2f} s", f"within the track, {times[0]:.2f} to {times[-1]:.2f} s",
-            "choose another time, or a longer track",
+            "choose another time or a longer track",
         )
 
 
 def _order(library: Library, plan: ResolvedPlan) -> Wanted:
-    """What the search is asked for; the generated clip is played at its own rate only."""
+    """Build the search request; the generated clip is played at its own rate only."""
     order = build_order(library, plan)
     keys = tuple(replace(key, rates=(1.0,)) if OWN_WORD in key.asked.words else key for key in order.keys)
     return replace(order, keys=keys)
@@ -138,6 +142,7 @@ def _order(library: Library, plan: ResolvedPlan) -> Wanted:
 def _construction(
     library: Library, plan: ResolvedPlan, order: Wanted, edit: EditList, heading_of: Callable
 ) -> Construction:
+    """Build the construction of the motion that the search found."""
     track = plan.sampled(plan.fps)
     index = output_index(len(track.times), library, plan.fps, len(edit))
     source = fetch(library, edit, index, plan.fps)
@@ -150,8 +155,11 @@ def _construction(
 
 
 def _heading_of(throw: Motion, begin: float, between: Motion | None) -> Callable:
-    """heading(track, source, clip) -> (T,) rad, NaN where it is free: as the throw, which is that clip and begins at
-    second `begin`, while it is shown; at both ends as `between`."""
+    """Build a function heading(track, source, clip) -> (T,) rad, NaN where the heading is free.
+
+    The heading is that of the throw, which is that clip and begins at second `begin`, while it is played, and that
+    of `between` at both ends.
+    """
     def given(track: SampledTrack, source: Footage, clip: int) -> np.ndarray:
         kept = np.full(len(track.times), np.nan)
         is_throw = source.clip == clip
@@ -167,8 +175,14 @@ def _heading_of(throw: Motion, begin: float, between: Motion | None) -> Callable
 
 
 def add_throw_clip(library: Library, motion: Motion, release: float, action: str = "throw") -> Library:
-    """The library with one clip more, in memory only: `motion`, on the library's skeleton, whose key moment lies
-    `release` s behind its first frame."""
+    """Add a clip to a library, in memory only.
+
+    Args:
+        library: the library.
+        motion: the throw on the library's skeleton.
+        release: s from its first frame to its key moment.
+        action: one of ACTIONS.
+    """
     edge = int(EDGE * motion.fps)
     words = (*ACTIONS[action], OWN_WORD)
     key = float(np.clip(release * motion.fps, edge, len(motion) - 1 - edge))
@@ -179,11 +193,11 @@ def add_throw_clip(library: Library, motion: Motion, release: float, action: str
 
 
 def _plan_with_throw(plan: Plan, throw: Motion, release: float, at: float, action: str) -> tuple[Plan, list[str]]:
-    """The plan with the throw in its track and timeline, and lines about what it leaves no room for."""
+    """Insert the throw into the track and timeline of a plan; also return warnings about what is left out."""
     begin = at - release
     asked, told = _timeline_with_throw(plan.timeline, begin, begin + throw.duration, at, ACTIONS[action])
     if plan.pins:
-        told.append("the plan's pins count for nothing beside a throw")
+        told.append("the plan's pinned clips are ignored, because the plan contains a throw")
     track = _lead_through(plan, throw, release, at)
     return replace(plan, track=track, timeline=asked, pins=(), method="path"), told
 
@@ -191,10 +205,10 @@ def _plan_with_throw(plan: Plan, throw: Motion, release: float, at: float, actio
 def _timeline_with_throw(
     timeline: Timeline, begin: float, finish: float, at: float, words: tuple[str, ...]
 ) -> tuple[Timeline, list[str]]:
-    """The timeline with the throw's key moment, without what it leaves no room for; lines about that."""
+    """Insert the throw's key moment into a timeline, without key moments that overlap it; also return warnings."""
     kept = [key for key in timeline.keys if not begin < key.in_force < finish]
     told: list[str] = [
-        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' lies within the throw, it is not played",
+        TimedLine(f"{told_time(key.time)} s: '{' '.join(key.words)}' overlaps the throw and is left out",
                   (key.time, key.time))
         for key in timeline.keys if key not in kept
     ]  # fmt: skip
@@ -203,7 +217,7 @@ def _timeline_with_throw(
 
 
 def _outside(span: Span, begin: float, finish: float) -> list[Span]:
-    """What is left of a span outside the throw."""
+    """Return the parts of a span outside the throw."""
     if span.end <= begin or span.start >= finish:
         return [span]
     parts = [(span.start, min(span.end, begin)), (max(span.start, finish), span.end)]
@@ -211,8 +225,10 @@ def _outside(span: Span, begin: float, finish: float) -> list[Span]:
 
 
 def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track:
-    """The plan's track, going where the throw is as long as it lasts: on either side it is left and met again at a
-    pace that bodies can go."""
+    """Lead the plan's track through the position of the throw while it lasts.
+
+    Before and after it the track makes a detour at a feasible pace.
+    """
     fps = plan.fps
     track = plan.sampled(fps)
     own = resample(throw, fps)
@@ -231,7 +247,7 @@ def _lead_through(plan: Plan, throw: Motion, release: float, at: float) -> Track
 
 
 def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: tuple, way: int) -> np.ndarray:
-    """The places (T, 2) m with a way from the track to the throw (way -1) or back to it (1)."""
+    """Insert a path from the track to the throw (way -1) or back to the track (1) into the positions (T, 2) m."""
     edge = there[0]
     off = np.linalg.norm([np.interp(edge, times, track.positions[:, axis]) - there[1][axis] for axis in (0, 1)])
     seconds = float(np.clip(2.0 * off / _CATCH_UP, *_LEADS))
@@ -248,5 +264,6 @@ def _bridge(places: np.ndarray, times: np.ndarray, track: SampledTrack, there: t
 
 
 def _velocity(path: np.ndarray, edge: int, fps: float) -> np.ndarray:
+    """Measure the velocity (2,) m/s of a path at its first (edge 0) or last frames."""
     few = path[:4] if edge == 0 else path[-4:]
     return (few[-1] - few[0]) / (len(few) - 1) * fps

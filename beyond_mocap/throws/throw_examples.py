@@ -1,8 +1,9 @@
-"""The recipe that reads a folder of recorded throws or kicks as examples for networks (Fredriksson §4.4 and §7.1).
+"""Read a folder of recorded throws or kicks as examples for networks (Fredriksson sections 4.4 and 7.1).
 
-A recording is found by its annotation, in the library's words (`throwb` or `throw` with the release as key moment,
-`kick` with the contact), by a row of `throws.csv`, or by the report that `release` wrote beside it. What nobody wrote
-down is read off the motion: which hand or foot, how fast the ball left, and where it would have met a wall.
+A throw is found by the annotation of its recording, in the library's labels (`throwb` or `throw` with the release as
+key moment, `kick` with the contact), by a row of `throws.csv`, or by the report that `release` wrote beside it.
+Unknown values are measured from the motion: which hand or foot, how fast the ball leaves, and where it would hit a
+wall.
 """
 
 from __future__ import annotations
@@ -30,15 +31,15 @@ from .networks.example import Example, example_of, mirrored
 from .throw_records import ACTIONS, TABLE_NAME, Action, KnownThrow, is_known, read_known, read_table
 
 _PAGE = "docs/throws/throw-examples.md"
-_AT_REST = 3.0  # m/s, slower balls have not been thrown
+_AT_REST = 3.0  # m/s; slower balls were not thrown
 _OF_FOOT = 1.2  # a ball's speed over the foot's: Kellis and Katis 2007, J. Sports Sci. Med. 6, 154-165 (1.06 to 1.3)
-_SHIFTED_FLOOR = 0.03  # m, heights of the lowest point up to which the floor is taken to be at 0
-_LOOK = 0.001  # s before and after the release between which the ball's speed is read, off the joints' splines
-_AROUND = 0.8  # s beyond an example's ends that are read too, for what networks see there
-_ON_GROUND = 0.4  # m, a toe below this kicks a ball that lies
-_LATE = 0.03  # s by which a foot's key moment may lead or follow the contact
-_TARGET_AWAY = (0.5, 200.0)  # m from the ball as it leaves to where it flew through
-_UNDER_FLOOR = 0.5  # m that a target may lie under what is taken for the floor
+_SHIFTED_FLOOR = 0.03  # m, height of the lowest point up to which the floor counts as at 0
+_LOOK = 0.001  # s before and after the release between which the ball's speed is measured on the joints' splines
+_AROUND = 0.8  # s beyond an example's ends that are read too, for the networks' windows
+_ON_GROUND = 0.4  # m; a toe below this kicks a ball on the ground
+_LATE = 0.03  # s by which a foot's key moment may precede or follow the contact
+_TARGET_AWAY = (0.5, 200.0)  # m, range of distances from the release to the target
+_UNDER_FLOOR = 0.5  # m that a target may be below the estimated floor
 
 
 def examples_in(
@@ -46,12 +47,22 @@ def examples_in(
     told: Callable[[str], None] = lambda line: None, *, mirror: bool = False,
     progress: Callable[[float, str], None] = lambda share, text: None, cancelled: Callable[[], bool] = lambda: False,
 ) -> list[Example]:
-    """The examples of `action` ("throw" or "kick") below `folder`, at `fps` frames per second, each in its own frame.
+    """Read the examples of an action below a folder, each in its own frame.
 
-    skeleton: bring all of them to this one; None leaves each its own. told: gets one line for each throw that is left
-    out, and why, and one for all recordings without any. mirror: of each also its mirror image, done with the other
-    hand or foot. InputError: no folder, no example in it, a table that cannot be read, a skeleton without hands or
-    feet."""
+    Args:
+        folder: folder of recordings.
+        action: "throw" or "kick".
+        fps: frames per second of the examples.
+        skeleton: retarget all examples to this one; None keeps their own.
+        report: receives one line for each throw that is left out with the reason, and one for all recordings without
+            any.
+        mirror: also return the mirror image of each, with the other hand or foot.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    Raises:
+        InputError: if there is no folder, no example in it, an unreadable table, or a skeleton without hands or
+            feet.
+    """
     if action not in ACTIONS:
         raise InputError("action", action, " or ".join(ACTIONS))
     if skeleton is not None:
@@ -79,10 +90,10 @@ def examples_in(
     if len(without) == len(clips):
         raise _nothing(folder, action, clips, words)
     if without:
-        told(f"{folder}: {len(without)} of {len(clips)} recordings left out, nobody wrote down a {action} in them; "
-             f"such as {without[0]}")  # fmt: skip
+        told(f"{folder}: {len(without)} of {len(clips)} recordings left out because no {action} is annotated in them, "
+             f"for example {without[0]}")  # fmt: skip
     if not found:
-        raise InputError(folder, f"each {action} in it had to be left out", "some that can be read",
+        raise InputError(folder, f"every {action} in it is left out", "at least one readable example",
                          f"see the notes, and {_PAGE}")  # fmt: skip
     if not mirror:
         return found
@@ -91,20 +102,20 @@ def examples_in(
 
 
 def _tell_strangers(words: Annotations, action: Action, folder: Path, told: Callable[[str], None]) -> None:
-    """A line for each table of annotations below the folder that tells of recordings which are not there."""
+    """Report each table of annotations below the folder that names missing recordings."""
     for table, rows in words.tables.items():
         if table != folder.absolute() and folder.absolute() not in table.parents:
-            continue  # of a larger library, which may have others
+            continue  # table of a larger library, which may have other recordings
         named = [name for name, its in rows.items() if any(action.words & set(one.words) for one in its)]
         missing = [name for name in named if not (table / name).is_file()]
         if missing:
             told(
-                f"{table / ANNOTATIONS_NAME}: names {len(missing)} recordings that are not there, such as {missing[0]}"
+                f"{table / ANNOTATIONS_NAME}: names {len(missing)} missing recordings, for example {missing[0]}"
             )
 
 
 def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -> InputError:
-    """A folder without the action; who looked for the wrong one is told."""
+    """Build the error for a folder without the action; it says if the folder has the other action."""
     names = {path.relative_to(folder).as_posix() for path in clips}
     for other, its in ACTIONS.items():
         rows = read_table(folder, its, names) if other != action else {}
@@ -116,13 +127,13 @@ def _nothing(folder: Path, action: str, clips: list[Path], words: Annotations) -
             )
     wanted = " or ".join(sorted(ACTIONS[action].words))
     return InputError(
-        folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the word {wanted}",
+        folder, f"{len(clips)} BVH files, none with a {action}", f"a key moment with the label {wanted}",
         f"write NAME.txt beside NAME.bvh, or {TABLE_NAME}; see {_PAGE}",
     )
 
 
 def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: float, bring, told) -> list[Example]:
-    """All examples in one recording."""
+    """Read all examples of one recording."""
     motion = bvh.read(path).motion
     every = read_known(path, motion.fps, action, words, rows)
     above = Path(name).parent.as_posix()
@@ -138,7 +149,7 @@ def _of_clip(path, name: str, action: Action, words: Annotations, rows, fps: flo
 
 
 class _Bring:
-    """Brings motions to one skeleton; each rig is studied once."""
+    """Retarget motions to one skeleton; each rig is analysed once."""
 
     def __init__(self, skeleton: Skeleton | None):
         self.skeleton = skeleton
@@ -156,9 +167,9 @@ class _Bring:
 def _example(
     name: str, motion: Motion, known: KnownThrow, action: Action, fps: float, bring: _Bring, who: str
 ) -> Example:
-    """One example cut out, brought to the wanted skeleton and rate, and set into its own frame."""
+    """Cut out one example, retarget it to the requested skeleton and rate, and move it to its own frame."""
     if known.release is None:
-        raise InputError("release", "no time", f"release_s in {TABLE_NAME}, or a key moment")
+        raise InputError("release", "no time", f"release_s in {TABLE_NAME} or a key moment")
     if not 0.1 <= known.release <= motion.duration - 0.1:
         raise InputError("release", f"{known.release:g} s", f"within the recording of {motion.duration:.2f} s")
     if action.ball is FOOTBALL and known.launch is None and known.speed is None:
@@ -172,7 +183,7 @@ def _example(
         raise InputError("ball", f"{np.linalg.norm(launch):.1f} m/s at the release", f"at least {_AT_REST:g} m/s")
     impact = _wall(position, launch, action) if known.target is None else _checked(known.target, position, launch)
     there = bring(cut)
-    if there is not cut:  # the same launch from another hand's place
+    if there is not cut:  # the same launch from the position of the retargeted hand
         impact = impact + _ball(there, release, limb) - _ball(cut, release, limb)
     begin, end = _stretch(motion, known, action)
     return example_of(name, who, there, limb=limb, release=release, impact=impact, launch=launch, fps=fps,
@@ -180,23 +191,23 @@ def _example(
 
 
 def _checked(target: np.ndarray, position: np.ndarray, launch: np.ndarray) -> np.ndarray:
-    """The target (3,) m that somebody wrote down. InputError where no ball that leaves `position` so flies through
-    it."""
+    """Check that a ball that leaves `position` can fly through the recorded target (3,) m; InputError if it cannot."""
     way = target - position
     away, (low, high) = float(np.linalg.norm(way)), _TARGET_AWAY
     if not low <= away <= high:
         raise InputError(
-            "target", f"{away:.3g} m from the ball as it leaves", f"{low:g} to {high:g} m", "check the unit"
+            "target", f"{away:.3g} m from the ball at the release", f"{low:g} to {high:g} m", "check the unit"
         )
     if target[2] < -_UNDER_FLOOR:
-        raise InputError("target", f"{-target[2]:.2f} m under the floor", "a place above it", "is Z up in the table?")
+        raise InputError("target", f"{-target[2]:.2f} m below the floor", "a point above it",
+                         "check that Z is up in the table")  # fmt: skip
     if way[:2] @ launch[:2] <= 0.0:
-        raise InputError("target", "not where the ball flies to", "a place ahead of it", "check the axes in the table")
+        raise InputError("target", "a point behind the ball", "a point ahead of it", "check the axes in the table")
     return target
 
 
 def _stretch(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, float]:
-    """Seconds between which the example lies."""
+    """Return the first and last second of an example."""
     begin, end = known.stretch or (known.release, known.release)
     begin = np.clip(begin, known.release - action.before[1], known.release - action.before[0])
     end = np.clip(end, known.release + action.after[0], known.release + action.after[1])
@@ -204,7 +215,7 @@ def _stretch(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, 
 
 
 def _cut(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, Motion]:
-    """The second from which on, and the frames which tell the example and what its windows see beyond it."""
+    """Cut out an example and its surroundings that windows include; also return the first second."""
     begin, end = _stretch(motion, known, action)
     first = max(int(np.floor((begin - _AROUND) * motion.fps)), 0)
     last = min(int(np.ceil((end + _AROUND) * motion.fps)), len(motion) - 1)
@@ -214,7 +225,7 @@ def _cut(motion: Motion, known: KnownThrow, action: Action) -> tuple[float, Moti
 
 
 def _on_floor(motion: Motion, known: KnownThrow) -> tuple[Motion, KnownThrow]:
-    """The same with the floor at 0, where the recording has it elsewhere."""
+    """Move a motion so that its floor is at 0, if the recording has it elsewhere."""
     places, _ = forward_kinematics(motion)
     lowest = np.concatenate([places, end_positions(motion)], axis=1)[..., 2].min(axis=1)
     floor = float(np.quantile(lowest, 0.05))
@@ -234,7 +245,7 @@ def _joint(body: Humanoid, limb: int) -> int:
 
 
 def _places(motion: Motion, seconds: np.ndarray, limb: int) -> np.ndarray:
-    """Where the ball would be (N, 3) m at `seconds` (N,): in the hand, or at the toe."""
+    """Compute where the ball would be, (N, 3) m, at seconds (N,): in the hand, or at the toe."""
     root, local = cubic_at(motion, np.asarray(seconds) * motion.fps)
     places, turns = pose_kinematics(motion.skeleton, root, local)
     joint = _joint(identify(motion.skeleton), limb)
@@ -249,26 +260,29 @@ def _ball(motion: Motion, seconds: float, limb: int) -> np.ndarray:
 
 
 def _velocity(motion: Motion, seconds: float, limb: int) -> np.ndarray:
-    """Of the ball (3,) m/s as the joints' rotations carry it."""
+    """Measure the velocity (3,) m/s of the ball from the joints' rotations."""
     before, after = _places(motion, seconds + np.array([-_LOOK, _LOOK]), limb)
     return (after - before) / (2.0 * _LOOK)
 
 
 def _fastest(motion: Motion, release: float, action: Action) -> int:
-    """The hand or foot that moves faster at the release."""
+    """Find the hand or foot that moves faster at the release."""
     speeds = [np.linalg.norm(_velocity(motion, release, limb)) for limb in action.limbs]
     return action.limbs[int(np.argmax(speeds))]
 
 
 def _contact(motion: Motion, known: KnownThrow, action: Action) -> float:
-    """The second near the key moment at which the foot is fastest: derived key moments lead or follow the contact."""
+    """Find the second near the key moment at which the foot is fastest.
+
+    Derived key moments precede or follow the contact.
+    """
     limb = _fastest(motion, known.release, action) if known.limb is None else known.limb
     seconds = known.release + np.linspace(-_LATE, _LATE, 13)
     return float(seconds[int(np.argmax([np.linalg.norm(_velocity(motion, at, limb)) for at in seconds]))])
 
 
 def _launched(motion: Motion, release: float, limb: int, known: KnownThrow) -> tuple[np.ndarray, np.ndarray]:
-    """The ball's place (3,) m and velocity (3,) m/s as it leaves."""
+    """Compute position (3,) m and velocity (3,) m/s of the ball at the release."""
     position = _ball(motion, release, limb)
     if known.launch is not None:
         return position, known.launch
@@ -282,6 +296,6 @@ def _launched(motion: Motion, release: float, limb: int, known: KnownThrow) -> t
 
 
 def _wall(position: np.ndarray, launch: np.ndarray, action: Action) -> np.ndarray:
-    """Where the ball meets an upright wall at the usual distance, or the ground before it."""
+    """Compute where the ball hits a vertical wall at the usual distance, or the ground before it."""
     ahead = launch[:2] / max(float(np.hypot(*launch[:2])), 1e-9)
     return meet_wall(position, launch, action.ball, position[:2] + action.wall * ahead, ahead)[0]

@@ -1,4 +1,4 @@
-"""What is asked of a throw or kick at a target, and what comes of it: the order, what was thrown, the ball's path."""
+"""Request for a throw or kick at a target, its result, and the ball's path."""
 
 from __future__ import annotations
 
@@ -19,23 +19,33 @@ from .letting_go import AtFoot, InHand, grip_point
 from .networks.chains import EFFECTORS
 
 KINDS: dict[str, Ball] = {**BALLS, **THROWN}
-"""Balls by name."""
+"""Kinds of balls by name."""
 RATES = (10.0, 480.0)
-"""Frames per second in which a throw can be shown: the ball's velocity is that of the hand between them."""
+"""Frame rates, frames per second, at which a throw can be generated: the ball's velocity is that of the hand between
+frames.
+"""
 
 
 @dataclass(frozen=True)
 class Order:
-    """What is asked for.
+    """Request for a throw or kick.
 
-    target: (3,) m, world, that the ball's centre is to go through. limb: of EFFECTORS, None: what the examples use.
-    speed: m/s wished for as the ball leaves, None: what suits. ball: a kind's name or a `Ball`, None: baseball in a
-    hand, football at a foot. One of start, over, ball_place (each (2,) or (3,) m over the ground) says where: where
-    the hips are in the first frame; where they are at the release; where the ball is that is kicked, on the ground or
-    as far above it as a foot gets. None: start at the origin. The body faces as the examples do, against the target.
-    release_time: s on the caller's clock at which the ball leaves, None: the motion begins at 0. fps: of the result,
-    None: the model's. seed: another motion with the same aim. freedom: what the correction may change beside wrist or
-    ankle."""
+    At most one of start, over and ball_place positions it on the ground; without any it starts at the origin. The
+    body faces the target as the examples do.
+
+    Attributes:
+        target: (3,) m, world, point that the ball's centre has to pass.
+        limb: one of EFFECTORS, None: the one that the examples use.
+        speed: m/s of the ball at the release, None: automatic.
+        ball: name of a kind or a `Ball`, None: baseball in a hand, football at a foot.
+        start: (2,) or (3,) m, position of the hips in the first frame.
+        over: (2,) or (3,) m, position of the hips at the release.
+        ball_place: (2,) or (3,) m, position of the kicked ball, on the ground or as far above it as a foot reaches.
+        release_time: s on the caller's clock at which the ball leaves, None: the motion begins at 0.
+        fps: frames per second of the result, None: the model's.
+        seed: selects another motion with the same target.
+        freedom: what the correction may change besides wrist or ankle.
+    """
 
     target: tuple[float, float, float]
     limb: str | None = None
@@ -58,34 +68,51 @@ class Order:
         if isinstance(self.ball, str) and self.ball not in KINDS:
             raise InputError("ball", self.ball[:40], ", ".join(KINDS))
         if self.speed is not None and not 0.0 < self.speed < np.inf:
-            raise InputError("speed", f"{self.speed:g} m/s", "more than 0")
+            raise InputError("speed", f"{self.speed:g} m/s", "more than 0 m/s")
         if self.seed < 0:
             raise InputError("seed", str(self.seed)[:40], "0 or more")
         given = [value for value in (self.start, self.over, self.ball_place) if value is not None]
         if len(given) > 1:
-            raise InputError("throw", "several places", "one of start, over and ball_place")
+            raise InputError("throw", "several positions", "only one: of the start, the release or the ball")
         if any(len(value) not in (2, 3) or not np.all(np.isfinite(value)) for value in given):
-            raise InputError("throw", f"a place {given[0]}"[:60], "x, y or x, y, z in metres")
+            raise InputError("throw", f"a position {given[0]}"[:60], "x, y or x, y, z in metres")
         if self.ball_place is not None and self.limb is not None and self.limb.endswith("hand"):
-            raise InputError("throw", "a place where the ball lies", "a foot that kicks it")
+            raise InputError("throw", "a ball on the ground and a hand", "a foot that kicks the ball")
         if self.fps is not None and not RATES[0] <= self.fps <= RATES[1]:
-            raise InputError("fps", f"{self.fps:g}", f"{RATES[0]:g} to {RATES[1]:g} frames a second")
+            raise InputError("fps", f"{self.fps:g}", f"{RATES[0]:g} to {RATES[1]:g} frames per second")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Thrown:
-    """A throw or kick that hits as well as physics lets it.
+    """A generated throw or kick that hits the target as well as physics allows.
 
-    motion; start_time: s of its first frame on the caller's clock; release: s from its first frame at which the ball
-    leaves. limb: of EFFECTORS. ball: its kind. grip: (3,) m, the ball in the hand joint's axes, None for kicks. path:
-    the ball at the motion's rate, carried or lying, then in flight, beyond the motion's end until it is past its
-    target. launch, flight. target, impact: (3,) m. moved: m that the wrist or ankle was moved at most, by shift (T,
-    3) m. turned rad, pace, later s, elsewhere m: how else the motion was changed (see `Corrected`). slowest: m/s
-    below which no ball gets there. asked_speed: m/s wished for, without a wish what came. raw_deviation: m that hands
-    and feet were off their wanted ways before any inverse kinematics, on average.
-    beyond: rad that a joint of the corrected limb is beyond the model's limits at most, which is nothing but what other
-    bones or another rate have made of it before anything was corrected. examples: names and weights of what it was
-    planned from. warnings: lines for people."""
+    Attributes:
+        motion: the motion.
+        start_time: s of its first frame on the caller's clock.
+        release: s from its first frame at which the ball leaves.
+        limb: one of EFFECTORS.
+        ball: kind of ball.
+        grip: (3,) m, the ball in the hand joint's axes, None for kicks.
+        path: the ball at the motion's rate, held or at rest, then in flight, beyond the motion's end until it is
+            past its target.
+        launch: position, velocity and spin at the release.
+        flight: flight of the ball.
+        target: (3,) m.
+        impact: (3,) m, where the ball passes the target.
+        displacement: m, largest displacement of the wrist or ankle by the correction.
+        shift: (T, 3) m, displacement of the wrist or ankle in each frame.
+        rotation: rad by which the body was rotated (see `CorrectedMotion`).
+        pace: playback rate that was applied.
+        release_delay: s by which the release was moved.
+        start_offset: m by which the start was moved.
+        min_speed: m/s, lowest speed at which a ball reaches the target.
+        requested_speed: m/s requested, or the actual speed without a request.
+        network_deviation: m, mean distance of hands and feet from their targets before any inverse kinematics.
+        limit_excess: rad, largest excess of a joint of the corrected limb over the model's limits; only other bones or
+            another frame rate can cause it, before any correction.
+        examples: names and weights of the blended examples.
+        warnings: warnings for people.
+    """
 
     motion: Motion
     start_time: float
@@ -113,22 +140,22 @@ class Thrown:
 
     @property
     def impact_error(self) -> float:
-        """m between target and impact, infinite where the ball does not get there."""
+        """Distance (m) between target and impact, infinite if the ball does not reach the target."""
         error = float(np.linalg.norm(self.impact - self.target))
         return error if np.isfinite(error) else np.inf
 
     @property
     def speed(self) -> float:
-        """m/s of the ball as it leaves."""
+        """Speed (m/s) of the ball at the release."""
         return float(np.linalg.norm(self.launch.velocity))
 
     @property
     def release_time(self) -> float:
-        """s on the caller's clock at which the ball leaves."""
+        """Time (s) of the release on the caller's clock."""
         return self.start_time + self.release
 
     def report(self) -> dict:
-        """All figures, for a JSON report."""
+        """Collect all figures for a JSON report."""
         frames = np.flatnonzero(np.any(self.shift != 0.0, axis=1))
         return {
             "limb": self.limb, "ball": self.ball.name, "fps": self.motion.fps, "frames": len(self.motion),
@@ -146,15 +173,30 @@ class Thrown:
 
 
 def part_of(skeleton: Skeleton, limb: int, ball: Ball, lies: np.ndarray | None = None) -> InHand | AtFoot:
-    """What lets the ball go. lies (3,) m: where a ball lies that is kicked, None: where it suits."""
+    """Build the hand or foot that releases the ball.
+
+    Args:
+        skeleton: skeleton of the body.
+        limb: index into EFFECTORS.
+        ball: kind of ball.
+        rest_position: (3,) m of a kicked ball, None: to be chosen.
+    """
     side, what = EFFECTORS[limb].split("_")
     return AtFoot(side, lies) if what == "foot" else InHand(side, grip_of(skeleton, side, ball.radius))
 
 
 def within(thrown: Thrown, motion: Motion, start: float, release: float, first: int) -> Thrown:
-    """The throw as part of a longer motion that begins at `start` s and shows the throw from its frame `first` on,
-    which the ball leaves at `release` s: as `throws.join_throw` says. The ball is held, or lies, all the time
-    before."""
+    """Convert a throw to a part of a longer motion, as built by `throws.join_throw`.
+
+    The ball is held, or at rest, all the time before.
+
+    Args:
+        thrown: the throw.
+        motion: the longer motion.
+        start: s of its first frame.
+        release: s at which the ball leaves.
+        first: frame of the longer motion with the first frame of the throw.
+    """
     launch = replace(thrown.launch, time=release)
     flight = fly(launch, thrown.ball, thrown.flight.end - thrown.launch.time + motion.duration)
     shift = np.zeros((len(motion), 3))
@@ -168,8 +210,15 @@ def within(thrown: Thrown, motion: Motion, start: float, release: float, first: 
 
 
 def ball_path(motion: Motion, part: InHand | AtFoot, flight: Flight, start: float, seconds: float) -> BallPath:
-    """The ball at the motion's rate, from `start` s on the caller's clock until the motion ends and it has flown
-    `seconds`."""
+    """Build the ball's path at the motion's rate.
+
+    Args:
+        motion: the motion.
+        part: hand or foot.
+        flight: flight of the ball.
+        start: s of the first frame on the caller's clock.
+        seconds: s of flight to include; the path lasts at least as long as the motion.
+    """
     fps = motion.fps
     left = flight.launch.time
     last = max(len(motion) - 1, int(np.ceil((left - start + seconds) * fps)))

@@ -1,4 +1,4 @@
-"""What was written down about recorded throws and kicks: in annotations, in `throws.csv`, by the command `release`."""
+"""Records of throws and kicks: annotations, `throws.csv`, and reports of the command `release`."""
 
 from __future__ import annotations
 
@@ -21,14 +21,22 @@ from .networks.chains import EFFECTORS as LIMBS
 TABLE_NAME = "throws.csv"
 TARGET = ("target_x_m", "target_y_m", "target_z_m")
 LAUNCH = ("launch_x_m_s", "launch_y_m_s", "launch_z_m_s")
-_SAME_MOMENT = 0.5  # s between key moments that are of one throw
-_FASTEST = 100.0  # m/s, no ball leaves a hand or a foot faster
+_SAME_MOMENT = 0.5  # s; closer key moments belong to one throw
+_FASTEST = 100.0  # m/s, upper limit of a ball from a hand or foot
 
 
 @dataclass(frozen=True, kw_only=True)
 class Action:
-    """What is looked for. words: any of them. limbs: indices of LIMBS. before, after: s around the release that are
-    wanted at least, and at most. wall: m ahead where an unknown target is thought to be. ball: its kind."""
+    """An action to look for.
+
+    Attributes:
+        labels: labels, any of which marks the action.
+        limbs: indices of LIMBS.
+        before: shortest and longest time, s, to include before the release.
+        after: shortest and longest time, s, to include after the release.
+        wall: m ahead at which an unknown target is assumed.
+        ball: kind of ball.
+    """
 
     words: frozenset[str]
     limbs: tuple[int, int]
@@ -44,12 +52,22 @@ ACTIONS = {
     "kick": Action(words=frozenset(list_labels(action="kick")), limbs=(2, 3), before=(1.2, 3.0), after=(0.8, 2.0),
                    wall=11.0, ball=FOOTBALL),
 }
-"""The walls: Fredriksson's stood about 4 m away (§8.2); a penalty is shot from 11 m."""
+"""Actions by name. The walls: Fredriksson's was about 4 m away (section 8.2); a penalty is shot from 11 m."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class KnownThrow:
-    """What was written about one throw; None is unknown. stretch, release: s. target, launch: (3,). speed m/s."""
+    """What is recorded about one throw; None is unknown.
+
+    Attributes:
+        stretch: first and last second.
+        release: s at which the ball leaves.
+        limb: index of LIMBS.
+        target: (3,) m that the ball flies through.
+        launch: (3,) m/s, velocity at the release.
+        speed: m/s at the release.
+        subject: name of the performer.
+    """
 
     stretch: tuple[float, float] | None = None
     release: float | None = None
@@ -61,14 +79,17 @@ class KnownThrow:
 
 
 def is_known(path: Path, action: Action, words: Annotations, rows: list[KnownThrow] | None) -> bool:
-    """Whether anybody wrote down that a recording has such an action."""
+    """Return whether an annotation, a table row or a report says that a recording has such an action."""
     return bool(rows) or any(_annotated(words, path, 120.0, action)) or _report_of(path).is_file()
 
 
 def read_known(
     path: Path, fps: float, action: Action, words: Annotations, rows: list[KnownThrow] | None
 ) -> list[KnownThrow]:
-    """What is known of each throw in a recording: the table first, then the report beside it, then its annotations."""
+    """Read what is recorded of each throw in a recording.
+
+    The table has priority over the report beside it, and that over its annotations.
+    """
     annotated = list(_annotated(words, path, fps, action))
     measured = _measured(_report_of(path), action)
     if not rows:
@@ -77,7 +98,7 @@ def read_known(
 
 
 def _near(annotated: list[KnownThrow], release: float | None) -> KnownThrow | None:
-    """The annotation of a release, the first where its time is not known."""
+    """Find the annotation of a release, the first one if its time is unknown."""
     if release is None:
         return annotated[0] if annotated else None
     close = [known for known in annotated if abs(known.release - release) < _SAME_MOMENT]
@@ -85,7 +106,7 @@ def _near(annotated: list[KnownThrow], release: float | None) -> KnownThrow | No
 
 
 def _filled(known: KnownThrow, other: KnownThrow | None) -> KnownThrow:
-    """`known`, with what only `other` knows."""
+    """Fill the unknown values of `known` with those of `other`."""
     if other is None:
         return known
     unknown = {name: getattr(other, name) for name, value in vars(known).items() if value is None}
@@ -93,7 +114,7 @@ def _filled(known: KnownThrow, other: KnownThrow | None) -> KnownThrow:
 
 
 def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> Iterator[KnownThrow]:
-    """The throws that annotations tell, each key moment once, in their order in time."""
+    """Iterate over the throws of the annotations, each key moment once, in the order of time."""
     last = -np.inf
     rows: list[ClipAnnotation] = [row for row in words.of(path, fps) if action.words & set(row.words)]
     for row in sorted((row for row in rows if row.key is not None), key=lambda row: row.key):
@@ -107,8 +128,13 @@ def _annotated(words: Annotations, path: Path, fps: float, action: Action) -> It
 
 
 def read_table(folder: Path, action: Action, names: set[str]) -> dict[str, list[KnownThrow]]:
-    """Rows of `throws.csv` in `folder` by file, one of the recordings' `names`; those of other limbs than the action's
-    left out. Nothing where there is none."""
+    """Read the rows of `throws.csv` in a folder by file; rows of other limbs than the action's are left out.
+
+    Args:
+        folder: the folder; an empty result if it has no table.
+        action: the action.
+        names: names of the recordings that rows may refer to.
+    """
     path, out = folder / TABLE_NAME, {}
     if not path.is_file():
         return out
@@ -116,13 +142,14 @@ def read_table(folder: Path, action: Action, names: set[str]) -> dict[str, list[
         known = _row(row, where)
         file = Path(row["file"]).as_posix()
         if file not in names:
-            raise InputError(where, f"no file {row['file'][:80]!r}", "a BVH file below this table, as seen from it")
+            raise InputError(where, f"no file {row['file'][:80]!r}", "a BVH file below this table, relative to it")
         if known.limb is None or known.limb in action.limbs:
             out.setdefault(file, []).append(known)
     return out
 
 
 def _row(row: dict[str, str], where: str) -> KnownThrow:
+    """Parse one row of the table."""
     def value(name: str) -> float | None:
         return number(row[name], name, where) if (row.get(name) or "").strip() else None
 
@@ -149,7 +176,7 @@ def _report_of(path: Path) -> Path:
 
 
 def _measured(path: Path, action: Action) -> KnownThrow | None:
-    """What the report of `release` says about a throw; None where there is none."""
+    """Read the report of `release` about a throw; None if there is none."""
     if not path.is_file() or action.ball is not BASEBALL:
         return None
     try:
@@ -164,5 +191,5 @@ def _measured(path: Path, action: Action) -> KnownThrow | None:
         if not (launch.shape == (3,) and np.isfinite(known).all() and np.linalg.norm(launch) <= _FASTEST):
             raise ValueError
     except (ValueError, KeyError, TypeError, UnicodeDecodeError, RecursionError):
-        raise InputError(path, "no report of a release", "what the command 'release' writes") from None
+        raise InputError(path, "not a release report", "a report written by the command 'release'") from None
     return KnownThrow(release=release, limb=limb, target=impact, launch=launch, speed=speed)

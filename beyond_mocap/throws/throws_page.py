@@ -1,5 +1,7 @@
-"""The report over generated throws or kicks as one page for a browser, with a picture of its motions as dots; it loads
-nothing, and all names are escaped."""
+"""Report on generated throws or kicks as one HTML page, with a dot plot of its motions.
+
+The page loads no other files, and all names are escaped.
+"""
 
 from __future__ import annotations
 
@@ -22,32 +24,32 @@ from ..evaluation.html_page import (
 from .evaluate_throws import LOST
 
 AIM = 0.03
-"""Metres: what the deviation of the networks alone is to stay below (his: 1.6 to 8 cm)."""
+"""Metres: target for the deviation of the networks alone (Fredriksson: 1.6 to 8 cm)."""
 EFFECTOR_NAMES = ("left arm", "right arm", "left leg", "right leg")
-"""As Fredriksson's tables call the effectors, which are wrists and toes."""
+"""Names of the effectors in Fredriksson's tables; they are wrists and toes."""
 _PRINTED = np.array([
     [0.0525, 0.0505, 0.0178, 0.0219], [0.0391, 0.0410, 0.0175, 0.0157],
     [0.0714, 0.0818, 0.0380, 0.0227], [0.0583, 0.0451, 0.0291, 0.0217],
 ])  # fmt: skip
-"""m: the deviations of his table 8.6, a row for each subject."""
+"""m: the deviations of Fredriksson's table 8.6, a row for each subject."""
 _FIGURES = (
-    ("impact_m", 1.0, 2, "m", "from the ball's impact on a wall 4 m away to where it was to be"),
-    ("far_impact", 1.0, 2, "m", "the same where the target is"),
-    ("own_impact", 1.0, 2, "m", "from the wanted ball's own impact to its target (what scaling by height does to a "
-                                "flight)"),
-    ("impacts_culled", 1.0, 0, "", "impacts left out of these, beyond three standard deviations"),
-    ("head", 1.0, 1, "°", "between the head and the recorded one"),
-    ("head_share", 1.0, 2, "×", "what the head turns against the chest, over the recording"),
-    ("jerk", 1.0, 2, "×", "jerk (99th percentile), over the recording"),
-    ("bones", 100.0, 2, "cm", "by which bones change their length"),
-    ("beyond", 100.0, 2, "%", "of the joints' rotations beyond the range of the examples"),
+    ("impact_m", 1.0, 2, "m", "impact error on a wall 4 m away"),
+    ("far_impact", 1.0, 2, "m", "impact error at the distance of the target"),
+    ("own_impact", 1.0, 2, "m", "from the impact of the requested ball to its target (effect of scaling by height on "
+                                "the flight)"),
+    ("impacts_culled", 1.0, 0, "", "impacts excluded from these means, beyond three standard deviations"),
+    ("head", 1.0, 1, "°", "between the head's rotation and the recorded one"),
+    ("head_share", 1.0, 2, "×", "rotation of the head relative to the chest, divided by the recording's"),
+    ("jerk", 1.0, 2, "×", "jerk (99th percentile), divided by the recording's"),
+    ("bones", 100.0, 2, "cm", "largest change of a bone's length"),
+    ("beyond", 100.0, 2, "%", "of the joint rotations outside the range of the examples"),
     ("seconds", 1.0, 2, "s", "to generate one motion"),
-    ("duration", 1.0, 2, "s", "that it lasts"),
+    ("duration", 1.0, 2, "s", "duration of a motion"),
 )
-"""Key of the report, what it is multiplied by, digits, unit, what it is."""
+"""Key of the report, factor, digits, unit, description."""
 _OF_BALL = ("impact_m", "far_impact", "own_impact", "impacts_culled")
 _COLUMNS = (
-    ("impact", 1.0, 2, "impact", "m"), ("head", 1.0, 1, "head", "°"), ("head_share", 1.0, 2, "head turns", "×"),
+    ("impact", 1.0, 2, "impact", "m"), ("head", 1.0, 1, "head", "°"), ("head_share", 1.0, 2, "head rotation", "×"),
     ("jerk", 1.0, 2, "jerk", "×"), ("beyond", 100.0, 1, "beyond", "%"), ("seconds", 1.0, 2, "takes", "s"),
 )
 _LABEL, _WIDTH, _RIGHT, _LINE, _TOP = 210.0, 680.0, 30.0, 20.0, 8.0  # px
@@ -57,13 +59,13 @@ _COLOURS = {"network": "#c2571a", "deviation": "#1f6fb2"}
 
 
 def throws_page(report: Mapping) -> str:
-    """The page, as text, of a report that `throw evaluate` writes."""
+    """Build the page, as text, from a report that `throw evaluate` writes."""
     model = str(report.get("model", ""))
     title = PurePath(model or "Throws").name
     left_out = [element("p", str(line)) for line in report["left_out"]]
     return build_page(
         title, element("h1", title), element("p", f"{model}: {report.get('trained_on', '')}", class_="quiet"),
-        *_said(report), build_section("How far hands and feet are from where they were wanted, cm",
+        *_said(report), build_section("Distance of hands and feet from their targets, cm",
                                       _deviations(report), _picture(report)),
         build_section("All figures", _figures(report)), build_section("All motions", _motions(report)),
         build_section("Left out", *left_out) if left_out else "",
@@ -71,42 +73,43 @@ def throws_page(report: Mapping) -> str:
 
 
 def _said(report: Mapping) -> list[Html]:
-    """What was measured, and how."""
+    """Describe what was measured, and how."""
     lost, people = report["lost"], ", ".join(map(str, report["subjects"]))
     of = f" of {report['examples']}" if report.get("examples") else ""
     who = f"{report['motions']} motions{of}, by {people}." if people else "No motions."
     how = "with inverse kinematics, limits and pose iterations" if _corrected(report) else "by the networks alone"
-    gone = f"{lost} lost their body (a hand or foot {LOST:g} m off on average) and are in no mean" if lost else \
-        "none lost its body"
-    return [element("p", who), element("p", f"Generated anew {how}; {gone}.")]
+    gone = f"{lost} failed (a hand or foot {LOST:g} m off on average) and are excluded from all means" if lost else \
+        "none failed"
+    return [element("p", who), element("p", f"Generated {how}; {gone}.")]
 
 
 def _corrected(report: Mapping) -> bool:
+    """Return whether the motions were corrected by inverse kinematics."""
     return bool(report.get("options", {}).get("ik", True))
 
 
 def _rows(report: Mapping) -> list[tuple[str, str]]:
-    """Titles of what is shown, and its key in each motion; one where nothing was corrected, for then they are alike."""
+    """List titles of the compared motions and their keys; only one if nothing was corrected."""
     alone = ("the networks alone", "network")
-    return [alone, ("as it comes out", "deviation")] if _corrected(report) else [alone]
+    return [alone, ("final motion", "deviation")] if _corrected(report) else [alone]
 
 
 def _deviations(report: Mapping) -> Html:
-    """As table 8.6, one row; his mean below."""
+    """Build the table of deviations, as table 8.6 in one row; Fredriksson's mean below."""
     rows = []
     for title, key in _rows(report):
         aim = 100.0 * AIM if key == "network" else None
         values = report[{"network": "network_deviation_m", "deviation": "deviation_m"}[key]].values()
         rows.append(build_row(title, *(_cell(value, aim) for value in values)))
     his = [build_number_cell(value, 2, 100.0) for value in _PRINTED.mean(axis=0)]
-    rows.append(build_row("Fredriksson, table 8.6, as it comes out", *his, class_="quiet"))
-    told = f"Green: within the aim of {100 * AIM:g} cm for the networks alone; red: beyond it."
+    rows.append(build_row("Fredriksson, table 8.6, final motion", *his, class_="quiet"))
+    told = f"Green: within the target of {100 * AIM:g} cm for the networks alone; red: above it."
     table = build_table(("mean", *map(build_title, EFFECTOR_NAMES)), rows)
     return fragment(table, element("p", told, class_="quiet"))
 
 
 def _picture(report: Mapping) -> Html:
-    """Every motion as a dot, a line for each hand and foot."""
+    """Build the dot plot: every motion is a dot, one line for each hand and foot."""
     rows = []
     for order, effector in enumerate(EFFECTOR_NAMES):
         for title, key in _rows(report):
@@ -116,11 +119,11 @@ def _picture(report: Mapping) -> Html:
             rows.append((f"{effector}, {title}", key, dots))
     if not any(dots for _, _, dots in rows):
         return Html()
-    return draw_strip(rows, 100.0 * AIM, "cm; each dot is a motion, the line is the aim for the networks alone")
+    return draw_strip(rows, 100.0 * AIM, "cm; each dot is a motion, the line is the target for the networks alone")
 
 
 def _figures(report: Mapping) -> Html:
-    """The means; without those of the ball where no ball was measured."""
+    """Build the table of means; without those of the ball if no ball was measured."""
     ball = report.get("impact_m") is not None or report.get("far_impact") is not None
     lines = [line for line in _FIGURES if ball or line[0] not in _OF_BALL]
     return build_table((), [
@@ -130,7 +133,7 @@ def _figures(report: Mapping) -> Html:
 
 
 def _motions(report: Mapping) -> Html:
-    """A row a motion; columns of which no motion has a value are left out."""
+    """Build the table of motions; columns without any value are left out."""
     columns = [one for one in _COLUMNS if any(_known(each[one[0]]) for each in report["each"])]
     titles = [(name, "cm") for name in EFFECTOR_NAMES] + [one[3:] for one in columns]
     rows = []
@@ -148,14 +151,19 @@ def _known(value: float | None) -> bool:
 
 
 def _cell(value: float | None, aim: float | None) -> Html:
-    """Centimetres of a value in metres, green up to the aim, which is in centimetres."""
+    """Build a cell in centimetres from a value in metres, green up to the target, which is in centimetres."""
     status = "" if aim is None or not _known(value) else "met" if 100.0 * value <= aim else "missed"
     return build_number_cell(value, 2, 100.0, status)
 
 
 def draw_strip(rows: Sequence[tuple[str, str, Sequence[tuple[float, str]]]], aim: float, unit: str) -> Html:
-    """The picture. rows: title, kind (of _COLOURS), and (value, what it is of) of each dot; aim: value of an upright
-    line; unit: the axis's text."""
+    """Draw a dot plot as SVG.
+
+    Args:
+        rows: title, kind (of _COLOURS), and (value, description) of each dot.
+        aim: value at which a vertical line is drawn.
+        unit: label of the axis.
+    """
     values = [value for _, _, dots in rows for value, _ in dots]
     step, end = _axis(max([1.2 * aim, *values]))
     bottom = _TOP + _LINE * len(rows)
@@ -177,7 +185,7 @@ def draw_strip(rows: Sequence[tuple[str, str, Sequence[tuple[float, str]]]], aim
 
 
 def _axis(most: float) -> tuple[float, float]:
-    """The distance of marks, and the last one, of an axis on which `most` has a place."""
+    """Choose the distance between the marks and the last mark of an axis that includes `most`."""
     step = next((one for one in _STEPS if most / one <= _MOST_MARKS), _STEPS[-1])
     return step, step * min(np.ceil(most / step), _MOST_MARKS)
 

@@ -1,9 +1,9 @@
-"""A throw or kick at a target: a network makes it, the body plays it, and the ball flies.
+"""Throws and kicks at a target: networks generate the motion, the armature plays it, and the ball flies.
 
-- `settings`   what the panel shows and what an armature keeps of its throw
-- `order`      the settings as plain values: who, from where, at what, when; what target and ball do
-- `made`       the throw that an order asks for, worked out in any thread
-- `shown`      the throw laid on the armature, kept or taken away again; made again where target or settings changed
-- `rigged`     the same on the controls of a rig
-- `flown`      the ball: in the hand or lying, then its flight and its trajectory
+- `settings`     properties in the panel, and the throw that an armature stores
+- `throw_task`   the settings as plain values; motion of target and ball
+- `generation`   generate the requested throw, in any thread
+- `preview`      show the throw on the armature, apply or revert it; update it when target or settings change
+- `rig_throw`    the same on the controls of a rig
+- `ball_motion`  the ball: held or at rest, then its flight and its trajectory
 """

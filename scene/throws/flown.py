@@ -1,7 +1,8 @@
-"""The ball of a throw or kick: in the hand or lying, then its flight; and its trajectory as a curve.
+"""The ball of a throw or kick: held or at rest, then its flight; and its trajectory as a curve.
 
 Up to the last frame before the release a thrown ball is carried by the hand's bone (`passes.possession`), so that it
-stays in the hand when the pose is worked on. What it did before goes on until then, and comes back with `give_back`.
+stays in the hand when the pose is edited. Its earlier motion continues until then, and `restore_ball` brings it
+back.
 """
 
 from __future__ import annotations
@@ -28,13 +29,22 @@ from .settings import MARK, BeyondMocapThrow
 if TYPE_CHECKING:
     from .made import Result
 
-FAR = 0.3  # metres from which on it is told that a ball jumps to the hand
+FAR = 0.3  # metres; larger jumps of the ball to the hand are reported
 NAMES = {"throw": "Thrown Ball", "kick": "Kicked Ball"}
 
 
 def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> list[str]:
-    """Let the ball go the way of a throw; it is made where there is none. What it did before goes on until the hand has
-    it, or the foot meets it. Returns lines about it."""
+    """Show the ball's motion; a ball is created if there is none.
+
+    Its earlier motion continues until the hand holds it or the foot strikes it.
+
+    Args:
+        scene: the scene.
+        body: the armature.
+        result: the throw.
+    Returns:
+        Messages for people.
+    """
     wish = body.beyond_mocap_throw
     if wish.flown is not None and (
         flies_for(wish.flown, body)
@@ -76,14 +86,16 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> li
 
 
 def check(wish: BeyondMocapThrow, result: "Result") -> None:
-    """InputError where others carry the ball when a hand is to have it."""
+    """Raise InputError if others carry the ball when the hand has to hold it."""
     if wish.ball is not None and result.order.act == "throw":
         taken_from(wish.ball, wish, *_spans(result))
 
 
 def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
-    """The ball does what it did before; one that was made goes, and so does the trajectory. What an armature shares
-    with the one that it was duplicated from stays with that one."""
+    """Restore the ball's earlier motion; remove a created ball and the trajectory.
+
+    Data that a duplicated armature shares with its original stays with the original.
+    """
     wish = body.beyond_mocap_throw
     ball, path = wish.flown, wish.curve
     if ball is None or not flies_for(ball, body):
@@ -98,7 +110,7 @@ def give_back(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
 
 
 def keep(body: bpy.types.Object) -> None:
-    """The ball is the user's from now on, with the way that it goes."""
+    """Make the ball with its motion a normal object of the user."""
     wish = body.beyond_mocap_throw
     ball = wish.flown
     if ball is not None and not flies_for(ball, body):
@@ -112,12 +124,13 @@ def keep(body: bpy.types.Object) -> None:
 
 
 def sweep() -> None:
-    """Remove the actions that balls of throws played which somebody has deleted."""
+    """Remove actions of deleted balls of throws."""
     for action in [one for one in bpy.data.actions if one.get(MARK) and not one.users - one.use_fake_user]:
         bpy.data.actions.remove(action)
 
 
 def _brought_back(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow) -> None:
+    """Restore an existing ball, or remove a created one."""
     made = _is_made(wish)
     _let_go(scene, ball, wish)
     if made:
@@ -128,12 +141,12 @@ def _brought_back(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMo
 
 
 def _is_made(wish: BeyondMocapThrow) -> bool:
-    """Whether the ball that flies was made for this throw; one of somebody else's has been put aside."""
+    """Return whether the ball was created for this throw; an existing ball is set aside instead."""
     return bool(wish.flown.get(KEPT)) and not wish.ball_before.kept
 
 
 def _let_go(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow) -> None:
-    """The hand of this throw does not carry the ball any more."""
+    """Release the ball from the hand of this throw."""
     holds = ball.beyond_mocap_ball.holds
     number = next((number for number, hold in enumerate(holds) if hold.name == wish.hold), None)
     if number is not None:
@@ -142,7 +155,7 @@ def _let_go(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThr
 
 
 def _spans(result: "Result") -> tuple[int, int]:
-    """Scene frames on which the throw begins, and up to which the ball has not left."""
+    """Return the scene frame on which the throw begins, and the last one before the release."""
     fps, joined = result.order.fps, result.joined
     return int(round(joined.start * fps)) + joined.first, int(np.floor(joined.release * fps + CLOSEST))
 
@@ -150,8 +163,17 @@ def _spans(result: "Result") -> tuple[int, int]:
 def keys(
     scene: bpy.types.Scene, wish: BeyondMocapThrow, result: "Result", ball: bpy.types.Object | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[int, int] | None, list[str]]:
-    """Frames (F,), places (F, 3) m and rotations (F, 4) of the ball; the frames on which the hand carries it, from and
-    to, None for a kick; lines for people. ball: None for one that has done nothing before."""
+    """Build the keys of the ball.
+
+    Args:
+        scene: the scene.
+        settings: settings of the throw.
+        result: the throw.
+        ball: the ball, None for one without an earlier motion.
+    Returns:
+        Frames (F,), positions (F, 3) m and rotations (F, 4) of the ball; the first and last frame in the hand, None
+        for a kick; messages for people.
+    """
     fps, flight, joined = result.order.fps, result.flight, result.joined
     release = joined.release * fps
     rest = flight.rests_from if flight.rests_from is not None else flight.end
@@ -183,14 +205,14 @@ def keys(
         way = _earlier(scene, ball, wish, does, taken - 1)
         away = float(np.linalg.norm(way[1][-1] - held[1][0]))
         if away > FAR:
-            told = [f"frame {taken}: the ball comes to the hand from {away:.1f} m away; let the hand take it before "
+            told = [f"frame {taken}: the ball jumps to the hand from {away:.1f} m away; let the hand take it before "
                     "(Take Ball), or choose another ball"]
         held = _joined(way, held)
     return *_flying(held, flies), (taken, last), told
 
 
 def in_hand(result: "Result", rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, 3) m and rotations (N, 4) of the ball in the hand at frames (N,) of the whole motion."""
+    """Compute positions (N, 3) m and rotations (N, 4) of the held ball at frames (N,) of the whole motion."""
     from ...beyond_mocap.motion.motion import pose_kinematics
 
     motion, hand = result.joined.motion, _hand(result)
@@ -199,6 +221,7 @@ def in_hand(result: "Result", rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _hand(result: "Result") -> int:
+    """Find the joint of the hand that throws."""
     from ...beyond_mocap.motion.humanoid import identify
 
     side = result.order.limb.partition("_")[0]
@@ -206,7 +229,7 @@ def _hand(result: "Result") -> int:
 
 
 def _earlier(scene, ball, wish, first: int, last: int):
-    """Frames (F,), places (F, 3) m and rotations (F, 4) of what a ball does without this throw."""
+    """Compute frames (F,), positions (F, 3) m and rotations (F, 4) of the ball without this throw."""
     frames = np.arange(first, last + 1)
     way = way_before(ball, wish, frames)
     places = np.array([place.to_translation() for place in way]) / units_per_metre(scene)
@@ -214,7 +237,7 @@ def _earlier(scene, ball, wish, first: int, last: int):
 
 
 def _flying(before, flies):
-    """What a ball does before it leaves, and its flight, as one; it turns in the air as it did when it left."""
+    """Join the motion before the release and the flight; the ball's rotation continues from the release."""
     frames, places, turns = flies
     turns = quaternion.multiply(turns, quaternion.multiply(quaternion.inverse(turns[:1]), before[2][-1:]))
     frames, places, turns = _joined(before, (frames, places, turns))
@@ -222,4 +245,5 @@ def _flying(before, flies):
 
 
 def _joined(before, behind):
+    """Join two tuples of arrays along the first axis."""
     return tuple(np.concatenate(pair) for pair in zip(before, behind))

@@ -1,4 +1,4 @@
-"""The throw that comes of an order, worked out in any thread: never touches bpy."""
+"""Generate the throw that a request asks for, in any thread: never uses bpy."""
 
 from __future__ import annotations
 
@@ -18,14 +18,24 @@ if TYPE_CHECKING:
     from ...beyond_mocap.throws.throw_order import Thrown
 
 FOLLOWED, LONGEST = 3.0, 10.0
-"""Seconds that the ball is followed behind the target, bouncing and rolling, and that it takes to get there at most."""
-_GUESS, _ROUNDS = 1.0, 5  # s of flight to a target that moves, to begin with; how often that is made better at most
+"""Seconds of the ball's flight shown beyond the target, bouncing and rolling, and the longest flight to the target."""
+_GUESS, _ROUNDS = 1.0, 5  # first estimate, s, of the flight to a moving target; largest number of corrections of it
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an order: the throw, the whole motion that shows it, the ball's way from the release on (seconds 0),
-    seconds until it passes the target, and m/s^3 of the seams and what is usual there."""
+    """A generated throw.
+
+    Attributes:
+        order: the request, with the actual release time.
+        thrown: the throw.
+        joined: the whole motion with the throw in it.
+        flight: the ball's trajectory from the release (0 s).
+        seconds: s until the ball passes the target.
+        library: library of the run-up, or None.
+        jerk: m/s^3, largest jerk of the transitions.
+        usual_jerk: m/s^3, usual jerk of the library's recordings, NaN without a library.
+    """
 
     order: Order
     thrown: "Thrown"
@@ -38,7 +48,13 @@ class Result:
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
-    """The throw, and the motion it is part of. Never touches bpy."""
+    """Generate a throw, and the motion it is part of.
+
+    Args:
+        order: the request.
+        progress: receives a share of 0 .. 1 and a text.
+        cancelled: returns True to stop.
+    """
     from ...beyond_mocap.ball.flight import fly
     from ...beyond_mocap.library.build import build
     from ...beyond_mocap.motion.retargeting.retarget import Retargeter
@@ -77,8 +93,14 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
 
 
 def _met(order: Order, own: "Motion", start: float, joined: bool, progress, cancelled):
-    """The order as it can be kept, its throw, and the seconds that the ball flies: it leaves later where the throw
-    would begin before the scene and may wait, and a target that moves is met where it is by then."""
+    """Generate the throw, with release time and target adapted to it.
+
+    The ball leaves later if the throw would begin before the scene and may wait, and a moving target is aimed at
+    where it is on arrival.
+
+    Returns:
+        The adapted request, the throw, and the s of the ball's flight.
+    """
     seconds = _GUESS
     for _ in range(_ROUNDS):
         target = order.targets[min(round(seconds * order.fps), len(order.targets) - 1)]
@@ -94,21 +116,21 @@ def _met(order: Order, own: "Motion", start: float, joined: bool, progress, canc
 
 
 def _when(asked: Order, order: Order, joined: "JoinedThrow") -> list[str]:
-    """Lines about a throw that does not fit into the scene before its release."""
+    """List warnings about a throw that begins before the scene."""
     first = round(order.begins * order.fps)
     begins = round(joined.start * order.fps) + joined.first
     if order.at != asked.at:
-        return [f"the ball leaves on frame {round(order.at * order.fps)}: sooner the {order.act} would begin before "
-                f"the scene's first frame"]
+        return [f"the ball leaves on frame {round(order.at * order.fps)}: with an earlier release the {order.act} "
+                f"begins before the scene's first frame"]
     if begins >= first:
         return []
     frame = round(order.at * order.fps) + first - begins
-    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set On Frame to "
+    return [f"the {order.act} begins on frame {begins}, before the scene's first frame {first}: set Release Frame to "
             f"{frame} or more to see all of it"]
 
 
 def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", float]:
-    """What is shown of a throw, and its release in that: a body on its way does not stop to wait."""
+    """Cut the waiting time from a throw, since a moving body does not stop; also return its release (s)."""
     from ...beyond_mocap.throws.join_throw import EASED, trim_waiting
     from ...beyond_mocap.throws.run_up import EDGE
 
@@ -116,8 +138,11 @@ def _shown(order: Order, thrown: "Thrown", joined: bool) -> tuple["Motion", floa
 
 
 def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, progress, cancelled) -> "Thrown":
-    """The throw where it has to be: begun where an armature that only stands is; over where its own motion has it at
-    the release, if a library joins them; else begun where its own motion leads, since it is eased out of that."""
+    """Generate the throw at its position.
+
+    At an armature without motion, it begins there; with a library, the body is where its own motion has it at the
+    release; otherwise it begins where the own motion leads, since it is blended with that.
+    """
     from ...beyond_mocap.throws.leave_path import is_in_reach, stopping_place
     from ...beyond_mocap.throws.network_npz import read_model, shipped_model
 
@@ -141,7 +166,7 @@ def _thrown(order: Order, target, own: "Motion", start: float, joined: bool, pro
 
 
 def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) -> "Thrown":
-    """The throw that begins, or is at its release, or finds the ball, `where`."""
+    """Generate the throw with `where` as position of its start, its release or its ball."""
     from ...beyond_mocap.throws import throw, throw_order
 
     asked = throw_order.Order(target=tuple(target - [0.0, 0.0, order.lift]), limb=order.limb,
@@ -150,7 +175,7 @@ def _thrown_from(order: Order, target, model, where: dict, progress, cancelled) 
 
 
 def _seconds(thrown: "Thrown") -> float:
-    """When the ball is nearest to where it passes the target, from the release on."""
+    """Find the s from the release at which the ball is nearest to where it passes the target."""
     from ...beyond_mocap.ball.flight import fly
 
     flight = fly(replace(thrown.launch, time=0.0), thrown.ball, LONGEST)
@@ -160,5 +185,5 @@ def _seconds(thrown: "Thrown") -> float:
 
 
 def _share(progress, low: float, high: float):
-    """A progress that fills a part of the bar."""
+    """Build a progress function for a part of the progress bar."""
     return lambda done, text: progress(low + (high - low) * done, text)

@@ -1,7 +1,7 @@
-"""What is asked of an armature, as plain values; where what is aimed at is, or the way on which the ball meets it; what
-the ball does before: keyed, thrown before, or carried by others for a while.
+"""Read the settings of an armature as a request of plain values, with the motion of target and ball.
 
-Seconds are scene frames over the scene's rate, so the throw's frames are the scene's.
+It also finds what the ball does before: keyed, thrown before, or carried by others for a while. Seconds are scene
+frames divided by the scene's frame rate, so the throw's frames are the scene's.
 """
 
 from __future__ import annotations
@@ -31,22 +31,41 @@ if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.motion.skeleton import Skeleton
 
-TARGET_SECONDS = 8.0  # seconds from the release on in which a target's own way counts
-_STILL = 1e-3  # m that a target moves by at most which stands
+TARGET_SECONDS = 8.0  # seconds from the release for which a target's motion is read
+_STILL = 1e-3  # m, largest motion of a target that counts as static
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """One throw or kick.
+    """Request for one throw or kick.
 
-    body: the armature's name. act: "throw" or "kick". skeleton: the armature's; of a control rig, that of the bones
-    that `table` (part -> bone) names, and lift: m that its soles are thicker than that skeleton's. own: what it plays,
-    in the scene's metres, None where it only stands; first: the scene frame with which that begins. place (2,) m and
-    facing rad: where an armature without a motion stands. targets (F, 3) m: where the target is on each frame from the
-    release on, (1, 3) of one that stands. at: s of the release; begins: s of the scene's first frame; waits: whether
-    the release may come later so that the throw does not begin before that. speed: m/s, 0 as usual. ball_place: (3,) m
-    where a ball that is kicked lies, None where it suits. model: a file, "" for what comes with the extension. folder:
-    the library's, "" for none; build: how it is built. digest: of the settings."""
+    Attributes:
+        body: name of the armature.
+        action: "throw" or "kick".
+        limb: one of EFFECTORS.
+        skeleton: skeleton of the armature; of a control rig, that of the bones that `table` names.
+        table: part -> bone of a control rig, empty for others.
+        sole_lift: m by which a rig's soles are thicker than those of its skeleton.
+        fps: frames per second of the scene.
+        own_motion: motion of the armature in the scene's metres, None if it has none.
+        first: scene frame at which that motion begins.
+        place: (2,) m, position of an armature without motion.
+        facing: rad, heading of an armature without motion.
+        targets: (F, 3) m, target on each frame from the release, (1, 3) if it is static.
+        at: s of the release.
+        scene_start: s of the scene's first frame.
+        may_wait: the release may be later so that the throw does not begin before the scene.
+        speed: m/s, 0 for automatic.
+        kind: kind of ball.
+        ball_place: (3,) m of a ball that is kicked, None to be chosen.
+        model: file of weights, "" for the one included.
+        seed: selects another motion.
+        folder: folder of the library, "" for none.
+        unit: metres per unit of the library, None for automatic.
+        library: loaded library, or None.
+        build: options of building the library.
+        digest: digest of the settings.
+    """
 
     body: str
     act: str
@@ -76,7 +95,7 @@ class Order:
 
 
 def digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> str:
-    """What an armature's settings ask for, to be compared. A target that moves by itself is told by its name alone."""
+    """Format an armature's settings as text to compare; a target that moves by itself is identified by its name."""
     wish, common = body.beyond_mocap_throw, scene.beyond_mocap
     folder = common.library_folder if wish.library else ""
     model = wish.throw_model if act == "throw" else wish.kick_model
@@ -86,7 +105,16 @@ def digest(scene: bpy.types.Scene, body: bpy.types.Object, act: str) -> str:
 
 
 def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: int = 0) -> Order:
-    """What an armature's settings ask for, on `frame`, 0 as they say; InputError where it cannot be animated so."""
+    """Build the request of an armature's settings.
+
+    Args:
+        scene: the scene.
+        body: the armature.
+        act: "throw" or "kick".
+        frame: frame of the release, 0 for the one of the settings.
+    Raises:
+        InputError: if the armature or the ball cannot be animated.
+    """
     wish, common = body.beyond_mocap_throw, scene.beyond_mocap
     check(scene, body)
     fps, rig = frames_per_second(scene), rigged.rig_of(scene, body)
@@ -111,58 +139,61 @@ def order_of(scene: bpy.types.Scene, body: bpy.types.Object, act: str, frame: in
 
 
 def check(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
-    """InputError where an armature or its ball cannot be animated here."""
+    """Raise InputError if an armature or its ball cannot be animated."""
     wish = body.beyond_mocap_throw
     channels.check_local(body, wish.ball)
     channels.check_free(body)
     refuse_system_override(body)
     if body.beyond_mocap_ride.on:
-        raise InputError(f"armature {body.name}", "its motion rides a path", "an armature that does not",
-                         "press Keep or Leave first")
+        raise InputError(f"armature {body.name}", "it has a path edit in preview", "an armature without a path edit",
+                         "press Apply or Revert first")
     if body.mode == "EDIT":
-        raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
+        raise InputError(f"armature {body.name}", "it is in edit mode", "object or pose mode",
                          "leave edit mode (Tab)")
     ball = wish.ball
     if ball is None:
         return
     if ball.name not in scene.objects:
-        raise InputError("ball", f"{ball.name} is not in this scene", "a ball of this scene", "pick another")
+        raise InputError("ball", f"{ball.name} is not in this scene", "a ball of this scene", "choose another ball")
     channels.check_free(ball)
     possession.check_unaimed(ball)
     other = flies_for(ball, body)
     if other is not None:
-        raise InputError(f"ball {ball.name}", f"it flies for {other.name}", "a ball that no throw shows yet",
-                         f"press Keep or Leave at {other.name} first, or choose another ball")  # fmt: skip
+        raise InputError(f"ball {ball.name}", f"it is in the preview of {other.name}", "a ball without a preview",
+                         f"press Apply or Revert for {other.name} first, or choose another ball")  # fmt: skip
     holds = {hold.name for hold in ball.beyond_mocap_ball.holds}
     if ball.parent is not None or any(one.name not in holds for one in ball.constraints):
         found = "it has a parent or a constraint"
-        raise InputError(f"ball {ball.name}", found, "a ball of its own", "clear them, or choose another ball")
+        raise InputError(f"ball {ball.name}", found, "a ball without them", "clear them, or choose another ball")
 
 
 def place_at(scene: bpy.types.Scene, ball: bpy.types.Object, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
-    """(3,) m where a ball is on a frame without this throw; InputError where it is carried then."""
+    """Find the position (3,) m of a ball on a frame without this throw; InputError if it is carried then."""
     for hold in _other_holds(ball, wish):
         if hold.first <= frame < hold.last:
             raise InputError(f"ball {ball.name}", f"{possession.holder_name(hold)} carries it on frame {frame}",
-                             "a ball that lies", "choose another frame, or free the ball")
+                             "a ball that is not carried", "choose another frame, or free the ball")
 
     place = way_before(ball, wish, np.array([frame]))[0].to_translation()
     return np.array(place) / units_per_metre(scene)
 
 
 def first_motion(ball: bpy.types.Object, wish: BeyondMocapThrow) -> int | None:
-    """The first frame on which a ball does something without this throw; None for one that lies all the time."""
+    """Find the first frame on which a ball moves without this throw; None if it never moves."""
     ends = channels.keyed_range(_own_way(ball, wish)[0])
     firsts = [hold.first - 1 for hold in _other_holds(ball, wish)] + ([ends[0]] if ends is not None else [])
     return min(firsts) if firsts else None
 
 
 def way_before(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarray) -> list[Matrix]:
-    """Where a ball is on frames (F,) without this throw, units; as if nobody carried it while somebody does."""
+    """Compute the transforms of a ball on frames (F,) without this throw, in units.
+
+    Frames on which others carry it are computed as if they did not.
+    """
     curves, stance = _own_way(ball, wish)
     found, ends = possession.way_of(curves, stance, frames), channels.keyed_range(curves)
     for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
-        if ends is None or ends[1] <= hold.last:  # it stays where it was let go
+        if ends is None or ends[1] <= hold.last:  # it stays where it was released
             action, slot = channels.playing(ball)
             shown = channels.curves(action, slot) if action is not None else {}
             dropped = possession.way_of(shown, stance_of(ball)[""], np.array([hold.last]))[0]
@@ -171,21 +202,31 @@ def way_before(ball: bpy.types.Object, wish: BeyondMocapThrow, frames: np.ndarra
 
 
 def taken_from(ball: bpy.types.Object, wish: BeyondMocapThrow, first: int, last: int) -> int:
-    """The frame, of first .. last, from which on the hand has a ball that it lets go on `last`: when others have done
-    with it. InputError where they have not."""
+    """Find the first frame from which the hand can hold a ball: after the last other that carries it.
+
+    Args:
+        ball: the ball.
+        settings: settings of the throw.
+        first: first frame of the throw.
+        last: last frame in the hand.
+    Raises:
+        InputError: if another carries it until the release.
+    """
     for hold in sorted(_other_holds(ball, wish), key=lambda hold: hold.last):
         if hold.first < last and first < hold.last:
             first = hold.last
             if first >= last - 1:
                 found = f"{possession.holder_name(hold)} carries it on frames {hold.first} to {hold.last}"
-                raise InputError(f"ball {ball.name}", found, "a ball that nobody else carries by then",
+                raise InputError(f"ball {ball.name}", found, "a ball that is free before the release",
                                  "choose a later frame, or free the ball")
     return first
 
 
 def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Object | None:
-    """Another armature whose throw, not kept yet, this ball shows; one that was deleted counts no more, though its ball
-    keeps it in the file."""
+    """Find another armature whose preview uses this ball.
+
+    Deleted armatures do not count, though the file may still contain them.
+    """
     return next(
         (one for one in bpy.data.objects if one.type == "ARMATURE" and one != body and one.beyond_mocap_throw.made
          and one.beyond_mocap_throw.flown == ball and one.users_scene), None,
@@ -193,7 +234,7 @@ def flies_for(ball: bpy.types.Object, body: bpy.types.Object) -> bpy.types.Objec
 
 
 def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
-    """What an armature plays without its throw, None where nothing, and the scene frame of its first pose."""
+    """Read an armature's motion without its throw, None if it has none, and the scene frame of its first pose."""
     before = body.beyond_mocap_throw.before
     if before.kept:
         found = before.action
@@ -210,7 +251,7 @@ def _own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None
 
 
 def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton") -> tuple[np.ndarray, float]:
-    """Where an armature without a motion stands, (2,) m, and which way it faces, rad."""
+    """Find position (2,) m and heading (rad) of an armature without motion."""
     from ...beyond_mocap.motion import quaternion
     from ...beyond_mocap.motion.humanoid import heading_from_positions
     from ...beyond_mocap.motion.motion import pose_kinematics
@@ -224,12 +265,13 @@ def _stands(scene: bpy.types.Scene, body: bpy.types.Object, skeleton: "Skeleton"
 
 
 def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) -> np.ndarray:
-    """(F, 3) m: the target on each frame from `frame` on, (1, 3) if it stands. InputError below ground or elsewhere."""
+    """Read the target's positions (F, 3) m from `frame` on, (1, 3) if it is static; InputError if it is invalid."""
     target, metres = wish.target, 1.0 / units_per_metre(scene)
     if target is None:
         found = np.array([scene.cursor.location]) * metres
     elif target.name not in scene.objects:
-        raise InputError("target", f"{target.name} is not in this scene", "an object of this scene", "pick another")
+        raise InputError("target", f"{target.name} is not in this scene", "an object of this scene",
+                         "choose another target")  # fmt: skip
     elif _may_move(target):
         found = _target_way(scene, target, frame) * metres
         if np.ptp(found, axis=0).max() < _STILL:
@@ -238,13 +280,13 @@ def target_places(scene: bpy.types.Scene, wish: BeyondMocapThrow, frame: int) ->
         found = np.array([_resting(target).translation]) * metres
     below = found[:, 2].min()
     if below < 0.0:
-        raise InputError("target", f"{-below:.2f} m below the ground", "one on or above it, where balls get",
-                         "raise it")
+        raise InputError("target", f"{-below:.2f} m below the ground", "a target on or above the ground",
+                         "move it up")
     return found
 
 
 def target_key(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> list | str:
-    """Where the target is, units, or the name of one that may move by itself."""
+    """Return the target's position in units, or the name of one that may move by itself."""
     target = wish.target
     if target is not None and _may_move(target):
         return target.name
@@ -253,7 +295,7 @@ def target_key(scene: bpy.types.Scene, wish: BeyondMocapThrow) -> list | str:
 
 
 def _may_move(thing: bpy.types.Object) -> bool:
-    """Whether keys, drivers or constraints have a say in where an object is, or in where its parents are."""
+    """Return whether keys, drivers, constraints or physics may move an object or one of its parents."""
     while thing is not None:
         if thing.animation_data is not None or len(thing.constraints) or thing.type == "ARMATURE" or thing.rigid_body:
             return True
@@ -262,8 +304,10 @@ def _may_move(thing: bpy.types.Object) -> bool:
 
 
 def _resting(thing: bpy.types.Object) -> Matrix:
-    """Where an object is that nothing moves. Worked out, since Blender forgets the matrix_world of what is hidden with
-    the next undo or load."""
+    """Compute the transform of an object that nothing moves.
+
+    Undo and loading clear the matrix_world of hidden objects, so it cannot be used.
+    """
     parent = thing.parent
     if parent is None:
         return thing.matrix_basis
@@ -273,7 +317,7 @@ def _resting(thing: bpy.types.Object) -> Matrix:
 
 
 def _target_way(scene: bpy.types.Scene, target: bpy.types.Object, frame: int) -> np.ndarray:
-    """(F, 3) units: where a target is from a frame on."""
+    """Read the positions (F, 3), in units, of a target from a frame on."""
     found = []
     with alone(target, scene) as side:
         for at in range(frame, frame + int(TARGET_SECONDS * frames_per_second(scene)) + 1):
@@ -283,7 +327,7 @@ def _target_way(scene: bpy.types.Scene, target: bpy.types.Object, frame: int) ->
 
 
 def _own_way(ball: bpy.types.Object, wish: BeyondMocapThrow) -> tuple[dict, list]:
-    """The curves of a ball's own way without this throw, and how it stands."""
+    """Return the curves of a ball's own motion without this throw, and its transform without curves."""
     own = ball.beyond_mocap_ball.before
     if wish.flown == ball and wish.ball_before.kept:
         return possession.played_before(wish.ball_before)
@@ -294,5 +338,5 @@ def _own_way(ball: bpy.types.Object, wish: BeyondMocapThrow) -> tuple[dict, list
 
 
 def _other_holds(ball: bpy.types.Object, wish: BeyondMocapThrow) -> list:
-    """The stretches in which the ball is carried, without this throw's."""
+    """List the ranges in which the ball is carried, without this throw's."""
     return [hold for hold in ball.beyond_mocap_ball.holds if not (wish.flown == ball and hold.name == wish.hold)]

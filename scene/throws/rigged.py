@@ -1,4 +1,4 @@
-"""Control rigs that throw: what their driven bones play, and the throw on their controls (`rig_bake`)."""
+"""Throws on control rigs: the motion of their driven bones, and the throw on their controls (`rig_bake`)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ _own: dict[int, tuple["Motion | None", int]] = {}
 
 
 def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
-    """The driven bones of an armature that does not simply play its keys, else None. InputError if not bakeable."""
+    """Find the driven bones of an armature that does not simply play its keys, else None.
+
+    Raises:
+        InputError: if it cannot be baked.
+    """
     wish = body.beyond_mocap_throw
     if not wish.rigged and (wish.before.kept or not _posed_otherwise(body)):
         return None
@@ -32,11 +36,11 @@ def rig_of(scene: bpy.types.Scene, body: bpy.types.Object) -> Driven | None:
 
 
 def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None", int]:
-    """What a rig shows without its throw, on its own skeleton, or None, and the scene frame of its first pose."""
+    """Read a rig's motion without its throw, on its own skeleton, or None, and the scene frame of its first pose."""
     if body.beyond_mocap_throw.rigged:
         if body.session_uid not in _own:
-            raise InputError(f"rig {body.name}", "it shows a throw of an earlier session", "its own motion",
-                             "press Leave first, then throw again")
+            raise InputError(f"rig {body.name}", "it has a preview from an earlier session", "its own motion",
+                             "press Revert first, then throw again")
         return _own[body.session_uid]
     data = body.animation_data
     strips = data is not None and data.use_nla and any(len(one.strips) and not one.mute for one in data.nla_tracks)
@@ -50,7 +54,7 @@ def own(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion | None"
 
 
 def stands(rig: Driven) -> tuple[np.ndarray, float]:
-    """Where a rig that plays nothing stands, (2,) m, and which way it faces, rad."""
+    """Find position (2,) m and heading (rad) of a rig without motion."""
     place = rig.placement.to_world(np.array([rig.rest_place[rig.bone("hips")]]))[0]
     ahead = quaternion.rotate(quaternion.inverse(rig.upright), np.array([1.0, 0.0, 0.0]))
     ahead = quaternion.rotate(rig.placement.rotation, ahead)
@@ -58,26 +62,37 @@ def stands(rig: Driven) -> tuple[np.ndarray, float]:
 
 
 def lift(rig: Driven) -> float:
-    """m that the rig's toes stand higher than those of its bare skeleton."""
+    """Measure by how much (m) the rig's toes are higher than those of its bare skeleton."""
     from ...beyond_mocap.motion.contacts import sole_height
 
     return rig.sole - sole_height(rig.skeleton)
 
 
 def lay(scene: bpy.types.Scene, body: bpy.types.Object, table: dict[str, str], motion: "Motion", start: int, name: str):
-    """Let a rig play a motion of its driven skeleton; `take_away` takes it away again. Returns lines about it."""
+    """Bake a motion of the driven skeleton to a rig's controls; `remove_throw` removes it.
+
+    Args:
+        scene: the scene.
+        body: the rig.
+        table: part -> bone.
+        motion: the motion.
+        start: scene frame of its first pose.
+        name: name of the action.
+    Returns:
+        Messages for people.
+    """
     source = Source(motion, start, name)
     fitted = rig_bake.fitted(body, table, source, scene, BakeOptions(exact=True))
     played = channels.playing(body)[0]
     if played is not None and not played.get(MARK):
-        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which is not to go
+        played.pop(rig_bake.MARK, None)  # an earlier bake is the rig's own motion, which must not be removed
     baked = rig_bake.lay(fitted)
     baked.action[MARK] = True
     return baked.told
 
 
 def take_away(body: bpy.types.Object) -> None:
-    """Let a rig play what it did before its throw; a bake below it can be taken away as before."""
+    """Restore a rig's animation before its throw; an earlier bake can still be removed."""
     rig_bake.remove_bake(body)
     played = channels.playing(body)[0]
     if played is not None and rig_bake.BEFORE in played:
@@ -85,7 +100,7 @@ def take_away(body: bpy.types.Object) -> None:
 
 
 def _posed_otherwise(body: bpy.types.Object) -> bool:
-    """Whether constraints, drivers or NLA strips have a say in an armature's pose, or its keys move more than bones."""
+    """Return whether constraints, drivers or NLA strips affect an armature's pose, or keys move more than its bones."""
     data = body.animation_data
     if data is not None and (channels.playing(body)[0] is not None or data.use_nla and len(data.nla_tracks)):
         return not is_plain(body)

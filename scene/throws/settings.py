@@ -1,4 +1,4 @@
-"""What the panel "Throws & Kicks" shows, and what an armature keeps of its throw; saved with the file."""
+"""Settings in the panel "Throws & Kicks", and the throw that an armature stores; saved with the file."""
 
 from __future__ import annotations
 
@@ -10,43 +10,45 @@ from ..result.result import BeyondMocapBefore
 
 USUAL = {"throw": "baseball", "kick": "football"}
 LIMBS = {"throw": "hand", "kick": "foot"}
-MARK = "beyond_mocap_thrown"  # custom property of what a throw has made; no group has its name
+MARK = "beyond_mocap_thrown"  # custom property of data created for a throw; no property group has its name
 
 
 @with_settings("throw", "throw.ball")
 class BeyondMocapThrow(bpy.types.PropertyGroup):
-    """How an armature is to throw or kick, and what came of it."""
+    """Settings of an armature's throw or kick, and its result."""
 
     attached_to = ("Object.beyond_mocap_throw",)
 
     target: PointerProperty(name="Target", type=bpy.types.Object,
-                            description="What is to be hit: any object's origin; none: the 3D cursor")
+                            description="Object whose origin the ball has to hit; if empty, the 3D cursor")
     ball: PointerProperty(name="Ball", type=bpy.types.Object, poll=lambda _own, thing: thing.type in {"MESH", "EMPTY"},
-                          description="The ball that flies; a kick strikes it where it lies. None: one is made")
+                          description="Ball to throw, or to kick from where it is; if empty, a ball is created")
     throw_model: StringProperty(
         name="Throw Model", subtype="FILE_PATH",
-        description="A trained model (.npz) of throws; empty: the one that comes with the extension",
+        description="Trained model (.npz) of throws; if empty, the one included in the extension",
     )
     kick_model: StringProperty(
         name="Kick Model", subtype="FILE_PATH",
-        description="A trained model (.npz) of kicks; empty: the one that comes with the extension",
+        description="Trained model (.npz) of kicks; if empty, the one included in the extension",
     )
-    made_of: StringProperty(name="Made of", options={"HIDDEN"}, description="The settings that it was made of")
-    asked: IntProperty(name="Asked", options={"HIDDEN"}, description="The frame on which it was made to leave")
-    made: StringProperty(name="Made", options={"HIDDEN"}, description="throw or kick; empty: none is shown")
-    rigged: BoolProperty(name="Rigged", options={"HIDDEN"}, description="Whether it is shown on a rig's controls")
-    release: FloatProperty(name="Released", options={"HIDDEN"}, description="Scene frame on which the ball leaves")
-    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about what is shown")
-    told: StringProperty(name="Told", options={"HIDDEN"}, description="What is to be known about it")
-    before: PointerProperty(type=BeyondMocapBefore, description="What the armature played before")
-    flown: PointerProperty(name="Flown", type=bpy.types.Object, options={"HIDDEN"}, description="The ball that flies")
-    hold: StringProperty(name="Hold", options={"HIDDEN"}, description="The stretch in which the hand carries the ball")
-    ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before")
-    curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="The curve along the ball's way")
+    made_of: StringProperty(name="Settings Digest", options={"HIDDEN"},
+                            description="Settings that the preview was generated with")
+    asked: IntProperty(name="Requested Frame", options={"HIDDEN"}, description="Requested frame of the release")
+    made: StringProperty(name="Action", options={"HIDDEN"}, description="Throw or kick in preview; empty without one")
+    rigged: BoolProperty(name="On Rig", options={"HIDDEN"}, description="The preview is on the controls of a rig")
+    release: FloatProperty(name="Release", options={"HIDDEN"}, description="Scene frame on which the ball leaves")
+    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the preview, one per line")
+    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
+    before: PointerProperty(type=BeyondMocapBefore, description="Animation of the armature before the preview")
+    flown: PointerProperty(name="Flying Ball", type=bpy.types.Object, options={"HIDDEN"},
+                           description="Ball of the preview")
+    hold: StringProperty(name="Hold", options={"HIDDEN"}, description="Range in which the hand holds the ball")
+    ball_before: PointerProperty(type=BeyondMocapBefore, description="Animation of the ball before the preview")
+    curve: PointerProperty(name="Trajectory", type=bpy.types.Object, description="Curve of the ball's trajectory")
 
 
 def thrower(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is meant: the active object, one that is selected, or whose ball or target is active."""
+    """Find the armature to animate: the active object, a selected one, or the one whose ball or target is active."""
     active = context.view_layer.objects.active
     chosen = [thing for thing in (active, *context.selected_objects) if thing is not None and thing.type == "ARMATURE"]
     if chosen or active is None:

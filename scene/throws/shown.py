@@ -1,10 +1,9 @@
-"""A throw on its armature and ball; what they did before is put aside and comes back, or the throw is kept. Until then
-it follows while its target is dragged and its settings are edited.
+"""Preview a throw on its armature and ball, apply or revert it, and update it while target or settings change.
 
-Blender says after every change that something has changed; a timer then compares what each throw was made of with what
-is asked now, and has it made again in a thread once the hand rests. What comes is a step of undo of its own: actions
-and balls are made and removed for it, and Blender may keep pointers to them over an undo that does not know of that.
-What undo or redo brings back is not made again, or there would be no way further back.
+Blender reports after every change that something has changed; a timer then compares the settings of each preview
+with the present ones and regenerates it in a thread once the user pauses. The result is an undo step of its own: it
+creates and removes actions and balls, and Blender may keep pointers to them over an undo that does not include them.
+A preview that undo or redo restores is not regenerated, otherwise earlier steps could not be reached.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
     from .made import Result
 
 MOST_LINES = 12
-BAKED = (BAKE_MARK, BEFORE, KEYS)  # what tells a bake that is taken away again
+BAKED = (BAKE_MARK, BEFORE, KEYS)  # custom properties of a bake that can be removed
 RESULTS = ("made", "made_of", "asked", "rigged", "release", "figures", "told")
 
 HELD_BY = ("BEYOND_MOCAP_OT_throw_at_target", "BEYOND_MOCAP_OT_kick_at_target")
@@ -40,7 +39,7 @@ _seen: dict = {"job": None, "begun": {}, "ended": set(), "restored": False}
 
 
 def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> None:
-    """Lay a throw on its armature and its ball."""
+    """Show a throw on its armature and its ball."""
     wish, joined, fps = body.beyond_mocap_throw, result.joined, frames_per_second(scene)
     order.check(scene, body)
     flown.check(wish, result)
@@ -67,7 +66,7 @@ def show(scene: bpy.types.Scene, body: bpy.types.Object, result: "Result") -> No
 
 
 def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
-    """The armature plays what it did before, and so does its ball; what was made for the throw goes."""
+    """Revert the preview: armature and ball play what they did before, and data created for the throw is removed."""
     wish = body.beyond_mocap_throw
     channels.check_local(body, wish.flown)
     channels.check_free(body)
@@ -81,7 +80,7 @@ def leave(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
 
 
 def keep(body: bpy.types.Object) -> None:
-    """The throw stays as the armature's own motion, its ball as an object of the user's."""
+    """Apply the preview: the throw becomes the armature's own motion, its ball a normal object."""
     wish = body.beyond_mocap_throw
     channels.check_local(body, wish.flown)
     played = channels.playing(body)[0]
@@ -94,18 +93,18 @@ def keep(body: bpy.types.Object) -> None:
 
 
 def figures(result: "Result") -> list[str]:
-    """Lines "name: value" about a throw."""
+    """List lines "name: value" about a throw."""
     thrown, joined, fps = result.thrown, result.joined, result.order.fps
     velocity = thrown.launch.velocity
     speed, level = float(np.linalg.norm(velocity)), float(np.linalg.norm(velocity[:2]))
     up = np.degrees(np.arctan2(velocity[2], level))
     limb = "Wrist" if result.order.act == "throw" else "Ankle"
-    lines = [f"Leaves on frame: {joined.release * fps:.2f}", f"Leaves with: {speed:.1f} m/s",
-             f"Launch angle: {up:.0f}\N{DEGREE SIGN}", f"Passes the target by: {100.0 * thrown.impact_error:.1f} cm",
-             f"Flight to the target: {result.seconds:.2f} s", f"{limb} moved to hit: {100.0 * thrown.moved:.1f} cm",
-             f"Slowest that gets there: {thrown.slowest:.1f} m/s"]
+    lines = [f"Release frame: {joined.release * fps:.2f}", f"Ball speed: {speed:.1f} m/s",
+             f"Launch angle: {up:.0f}\N{DEGREE SIGN}", f"Target error: {100.0 * thrown.impact_error:.1f} cm",
+             f"Flight to target: {result.seconds:.2f} s", f"{limb} correction: {100.0 * thrown.moved:.1f} cm",
+             f"Lowest speed: {thrown.slowest:.1f} m/s"]
     if np.isfinite(result.usual_jerk):
-        lines.append(f"Seam jerk, of p99: {100.0 * result.jerk / result.usual_jerk:.0f} %")
+        lines.append(f"Transition jerk: {100.0 * result.jerk / result.usual_jerk:.0f} %")
     return lines
 
 
@@ -115,7 +114,10 @@ def _reset(wish) -> None:
 
 
 def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
-    """An armature whose throw is not as asked; each wish is begun once, also where undo or redo brings it back."""
+    """Find an armature whose preview is not up to date.
+
+    Each request is started once, also if undo or redo restores it.
+    """
     asked = {}
     for body in scene.objects:
         if body.type != "ARMATURE" or body.library is not None:
@@ -135,14 +137,14 @@ def due(scene: bpy.types.Scene) -> bpy.types.Object | None:
 
 
 def begin(scene: bpy.types.Scene, body: bpy.types.Object) -> background.Job:
-    """Make an armature's throw again in a thread, on the frame on which it is."""
+    """Regenerate an armature's throw in a thread, on its present frame."""
     wish = body.beyond_mocap_throw
     asked = order.order_of(scene, body, wish.made, wish.frame or wish.asked)
     return background.Job(KIND, lambda *asking: made.work(asked, *asking))
 
 
 def finish(scene: bpy.types.Scene, job: background.Job) -> None:
-    """Show a thread's result, as a step of undo, where it is still asked for. BeyondMocapError where there is none."""
+    """Show a thread's result as an undo step if it is still requested; raise its BeyondMocapError if it failed."""
     if background.cancelled(job):
         return
     if job.error is not None:
@@ -154,15 +156,15 @@ def finish(scene: bpy.types.Scene, job: background.Job) -> None:
     if order.digest(scene, body, asked.act) == asked.digest:
         show(scene, body, job.result)
         _seen["ended"].add((body.name, asked.digest))
-        bpy.ops.ed.undo_push(message=f"{body.name} {asked.act}s again")
-    elif _seen["begun"].get(body.name) == asked.digest:  # it may be asked for again
+        bpy.ops.ed.undo_push(message=f"Update {body.name} {asked.act}")
+    elif _seen["begun"].get(body.name) == asked.digest:  # it may be requested again
         del _seen["begun"][body.name]
 
 
 def settle(scene: bpy.types.Scene) -> bool:
-    """Show what has come, begin what is due; whether something is made or has to wait."""
+    """Show finished results and start due updates; return whether something runs or has to wait."""
     active = bpy.context.view_layer.objects.active
-    if active is not None and active.mode not in MODES:  # steps of undo know of the active object alone there
+    if active is not None and active.mode not in MODES:  # undo steps contain only the active object in other modes
         return True
     name = _seen["job"][0] if _seen["job"] else ""
     if _seen["job"]:
@@ -181,23 +183,23 @@ def settle(scene: bpy.types.Scene) -> bool:
 
 
 def _try(scene: bpy.types.Scene, name: str, call) -> None:
-    """Call it; where that fails, say at an armature why its throw, which stays as it was, is not what is asked for."""
+    """Call a function; if it fails, show at the armature why its unchanged preview is out of date."""
 
     def tell(text: str) -> None:
         body = scene.objects.get(name)
         if body is not None:
             body.beyond_mocap_throw.told = text
 
-    attempt(call, tell, f"{name}: could not be made again here")
+    attempt(call, tell, f"{name}: the preview cannot be updated")
 
 
 def restored() -> None:
-    """What undo or redo brings back is not made again."""
+    """Note that undo or redo restored previews, which are not regenerated."""
     _seen["restored"] = True
 
 
 def forget() -> None:
-    """Another file is open, or none is looked at any more."""
+    """Clear all state when another file is opened or the extension is disabled."""
     background.stop(KIND)
     _seen.update(job=None, begun={}, ended=set(), restored=False)
 

@@ -21,7 +21,7 @@ def place(tmp_path_factory):
 @pytest.mark.parametrize("more, said", [
     (("--config", "no.json"), "no.json: no such file"),
     (("--config", "bad.json"), "bad.json: model settings: units: 0"),
-    (("--resume",), "w.checkpoint.npz: no checkpoint there"), (("--skeleton", "stick.bvh"), "stick.bvh: skeleton"),
+    (("--resume",), "w.checkpoint.npz: no such file"), (("--skeleton", "stick.bvh"), "stick.bvh: skeleton"),
     (("--action", "kick"), "none with a kick, 2 with a throw"), (("--seed", "-1"), "--seed"),
     (("--seed", "1e3"), "--seed"), (("--subject", "nobody"), "nobody"), (("--minutes", "nan"), "--minutes"),
 ])

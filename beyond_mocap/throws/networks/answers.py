@@ -1,6 +1,9 @@
-"""What a network's answer is, and how it becomes a pose: hips in the world, all other joints relative to their
-parents; the single network says places and turns of all joints, which need not fit together (Fredriksson §7.2, §7.3,
-eq. 7.5)."""
+"""The output of a network, and how it becomes a pose.
+
+Hips in the world, all other joints relative to their parents; the single network predicts positions and rotations of
+all joints, which need not be consistent.
+Source: Fredriksson sections 7.2 and 7.3, eq. 7.5.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,7 @@ from .model import SINGLE, ModelSettings
 
 
 def network_output(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, xp=np):
-    """The answer y (..., out) that leads from `pose` to `after`: what a network is trained to say."""
+    """Build the output y (..., out) that leads from `pose` to `after`: the training target of a network."""
     if name in ("hip", SINGLE):
         joints = predicted(name, chains, settings)
         places = picked(after.positions, joints, -2, xp) - origin(chains, settings, pose)[..., None, :]
@@ -24,10 +27,23 @@ def network_output(name: str, chains: Chains, settings: ModelSettings, pose: Pos
 def answered(
     name: str, chains: Chains, settings: ModelSettings, y, pose: Pose, after: Pose, window: Windows, xp=np
 ) -> Pose:
-    """`after` with what the network's answer y (..., out) says; places and turns of its chain are right from then on.
+    """Apply the output of a network to a pose.
 
-    The single network's places are left out here and its turns taken, so that bones keep their length: `floating` has
-    them."""
+    The single network's positions are left out here and its rotations used, so that bones keep their length;
+    `split_single_output` returns them.
+
+    Args:
+        name: name of the network.
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        y: (..., out) output.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    Returns:
+        `after` with valid positions and rotations of the network's chain.
+    """
     if name == SINGLE:
         return _single_pose(chains, settings, y, pose, xp)
     if name == "hip":
@@ -44,19 +60,22 @@ def answered(
 
 
 def floating(chains: Chains, settings: ModelSettings, y, pose: Pose, xp=np):
-    """What the single network says of each of `chains.joints`: places (..., j, 3) m and turns (..., j, 3, 3), in the
-    world. Bones between them have any length (§7.3)."""
+    """Split the output of the single network into positions (..., j, 3) m and rotations (..., j, 3, 3), world.
+
+    They are those of `chains.joints`; the bones between them have any length (section 7.3).
+    """
     count = len(chains.joints)
     places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3) + origin(chains, settings, pose)[..., None, :]
     return places, from_six(y[..., 3 * count :].reshape(*y.shape[:-1], count, 6), xp)
 
 
 def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
-    """Where an answer y (..., out) brings the ends that the loss looks at (E_i of eq. 7.5): (..., E, 3) metres.
+    """Compute the end positions (..., E, 3) m of an output y (..., out) that the loss compares (E_i of eq. 7.5).
 
-    Of hip both upper legs, of body both upper arms and the head (his two, and the head, whose motion was lost in
-    his), of a limb its wrist or toe, each in the chain's reference frame; of the single network its four effectors.
-    Joints that ride along are taken as at rest."""
+    For the hip both upper legs, for the body both upper arms and the head (Fredriksson: the upper arms only, which
+    lost the motion of the head), for a limb its wrist or toe, each in the reference frame of the chain; for the
+    single network its four effectors. Joints that no network moves count as at rest.
+    """
     if name == SINGLE:
         count = len(chains.joints)
         places = y[..., : 3 * count].reshape(*y.shape[:-1], count, 3)
@@ -76,7 +95,7 @@ def ends(name: str, chains: Chains, settings: ModelSettings, y, xp=np):
 
 
 def _from_hips(chains: Chains, number: int) -> np.ndarray:
-    """A leg's first joint seen from the hips, joints between at rest: (3,) m."""
+    """Compute the position (3,) m of a leg's first joint relative to the hips, joints between them at rest."""
     way, joint = np.zeros(3), chains.sockets[number]
     while joint != chains.hips:
         way, joint = way + chains.skeleton.offsets[joint], chains.skeleton.parents[joint]
@@ -84,7 +103,7 @@ def _from_hips(chains: Chains, number: int) -> np.ndarray:
 
 
 def _reached(chains: Chains, joints: tuple[int, ...], turns, reference: int, goal: int, xp):
-    """Place (..., 3) m of a joint in the frame of `reference`, out of the rotations (..., N, 3, 3) of `joints`."""
+    """Compute the position (..., 3) m of joint `goal` in the frame of `reference`; turns (..., N, 3, 3) of `joints`."""
     place, joint = chains.skeleton.offsets[goal], chains.skeleton.parents[goal]
     while joint != reference:
         if joint in joints:
@@ -94,7 +113,7 @@ def _reached(chains: Chains, joints: tuple[int, ...], turns, reference: int, goa
 
 
 def _hips_at(chains: Chains, after: Pose, place, turn, xp) -> Pose:
-    """The body with its hips at a place (..., 3) m, turned by (..., 3, 3); joints above them only move."""
+    """Place the hips at (..., 3) m with rotation (..., 3, 3); joints above them only move."""
     root, above = place, None
     for joint in (*chains.above, chains.hips):
         if joint == 0:
@@ -106,7 +125,7 @@ def _hips_at(chains: Chains, after: Pose, place, turn, xp) -> Pose:
 
 
 def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> Pose:
-    """The body with the hips' place and all turns that the single network says."""
+    """Build the pose with the hip position and all rotations that the single network predicts."""
     places, turns = floating(chains, settings, y, pose, xp)
     own = {joint: turns[..., i, :, :] for i, joint in enumerate(chains.joints)}
     after = _hips_at(chains, pose, places[..., 0, :], own[chains.hips], xp)
@@ -117,13 +136,13 @@ def _single_pose(chains: Chains, settings: ModelSettings, y, pose: Pose, xp) -> 
 
 
 def origin(chains: Chains, settings: ModelSettings, pose: Pose):
-    """Where hip and single network measure from: (..., 3) metres."""
+    """Compute the point (..., 3) m from which the hip and single network measure positions."""
     level = np.array([1.0, 1.0, 0.0] if settings.frame == "hip" else [0.0, 0.0, 0.0])
     return pose.positions[..., chains.hips, :] * level
 
 
 def predicted(name: str, chains: Chains, settings: ModelSettings) -> tuple[int, ...]:
-    """Joints whose rotation (and place: hip, single) a network says."""
+    """List the joints whose rotation (for hip and single also position) a network predicts."""
     if name == SINGLE:
         return chains.joints
     members = chains.members[name]

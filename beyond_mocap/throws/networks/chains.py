@@ -1,10 +1,9 @@
-"""Which joints the networks of the hierarchy move: hip, body, two arms, two legs, of any humanoid (Fredriksson §7.3).
+"""Joints that the networks of the hierarchy move: hip, body, two arms, two legs, of any humanoid (Fredriksson 7.3).
 
-He has 25 joints: the hips, ten of the body (spine, thorax, neck, head, both scapulae), three of each arm and four of
-each leg. Here a body chain is whatever lies between the hips, the head and both upper arms, an arm runs from the
-upper arm to the hand and a leg from the upper leg to the toe, joints between them included. All other joints
-(fingers, twist bones, props, joints between the hips and an upper leg) ride along with the local rotation that they
-have.
+The thesis has 25 joints: the hips, ten of the body (spine, thorax, neck, head, both scapulae), three of each arm and
+four of each leg. Here the body chain contains all joints between the hips, the head and both upper arms, an arm runs
+from the upper arm to the hand and a leg from the upper leg to the toe, including joints between them. All other
+joints (fingers, twist bones, props, joints between the hips and an upper leg) keep their local rotation.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from ...motion.retargeting import structure
 from ...motion.skeleton import Skeleton
 
 HIERARCHY = ("hip", "body", "left_arm", "right_arm", "left_leg", "right_leg")
-"""The networks in the order in which they speak: each knows what those before it said."""
+"""The networks in the order of evaluation: each receives the output of those before it."""
 EFFECTORS = ("left_hand", "right_hand", "left_foot", "right_foot")
 LIMB_OF = ("left_arm", "right_arm", "left_leg", "right_leg")
 """The chain of each effector."""
@@ -28,11 +27,21 @@ LIMB_OF = ("left_arm", "right_arm", "left_leg", "right_leg")
 class Chains:
     """Joint indices of a skeleton by chain.
 
-    above: the joints over the hips, held still. members: chain name -> its joints, parents first; arms end with the
-    hand, legs with the toe. references: chain -> the joint that it hangs on (-1 for the hip). known: chain -> all
-    joints whose place is known once this chain is. effectors: the joints of both hands and both toes. sockets: the
-    first joints of both arms and legs, middles: elbows and knees, ankles: feet. chest, neck, head: the next below where
-    there is none."""
+    Attributes:
+        skeleton: the skeleton.
+        hips: the hip joint.
+        above: joints above the hips, which do not rotate.
+        members: chain name -> its joints, parents first; arms end with the hand, legs with the toe.
+        references: chain -> the joint that it hangs on (-1 for the hip).
+        known: chain -> all joints whose position is known once this chain is.
+        effectors: joints of both hands and both toes.
+        sockets: first joints of both arms and both legs.
+        middles: elbows and knees.
+        ankles: both feet.
+        chest: chest joint, or the next joint below.
+        neck: neck joint, or the next joint below.
+        head: head joint, or the next joint below.
+    """
 
     skeleton: Skeleton
     hips: int
@@ -55,13 +64,13 @@ class Chains:
 
     @cached_property
     def hip_sees(self) -> tuple[int, ...]:
-        """The 14 joints whose state the hip network sees: hips, chest, and of each limb upper, middle and end."""
+        """The 14 input joints of the hip network: hips, chest, and of each limb upper, middle and end."""
         ends = (*self.effectors[:2], *self.ankles)
         return (self.hips, self.chest, *self.sockets, *self.middles, *ends)
 
     @cached_property
     def body_sees(self) -> tuple[int, ...]:
-        """The 8 joints outside the body that its network sees: elbows, knees, wrists, ankles."""
+        """The 8 input joints of the body network, all outside the body: elbows, knees, wrists, ankles."""
         return (*self.middles, *self.effectors[:2], *self.ankles)
 
     @cached_property
@@ -71,19 +80,23 @@ class Chains:
 
     @cached_property
     def arm_sees(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """The (7) joints of the trunk whose places the left and right arm network sees: all but its own reference."""
+        """The (7) trunk joints whose positions the left and right arm networks receive: all but their own reference."""
         left, right = (tuple(j for j in self.trunk if j != self.references[arm]) for arm in LIMB_OF[:2])
         return left, right
 
     @cached_property
     def leg_sees(self) -> tuple[int, ...]:
-        """The (6) joints of the body whose turns the leg networks see."""
+        """The (6) body joints whose rotations the leg networks receive."""
         carriers = (self.references[arm] for arm in LIMB_OF[:2])
         return tuple(dict.fromkeys((self.members["body"][0], self.chest, *carriers, self.neck, self.head)))
 
 
 def chains_of(skeleton: Skeleton) -> Chains:
-    """The chains of a humanoid skeleton. InputError where it lacks hands, legs or a trunk between hips and arms."""
+    """Find the chains of a humanoid skeleton.
+
+    Raises:
+        InputError: if the skeleton lacks hands, legs or a trunk between hips and arms.
+    """
     body = identify(skeleton)
     _check(body.left, body.right)
     parents = skeleton.parents
@@ -110,6 +123,7 @@ def chains_of(skeleton: Skeleton) -> Chains:
 
 
 def _check(left: Limb, right: Limb) -> None:
+    """Raise InputError if an arm or leg lacks a joint."""
     wanted = ("upper_arm", "lower_arm", "hand", "upper_leg", "lower_leg", "foot")
     missing = [
         f"{side} {part.replace('_', ' ')}"
@@ -119,11 +133,11 @@ def _check(left: Limb, right: Limb) -> None:
     ]
     if missing:
         found = f"no {', no '.join(missing)}"
-        raise InputError("skeleton", found, "a body with arms, hands and feet", "take another rig")
+        raise InputError("skeleton", found, "a body with arms, hands and feet", "choose another rig")
 
 
 def _between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
-    """Joints from `high` down to `low`, both included; InputError where `low` does not hang below."""
+    """List the joints from `high` down to `low`, both included; InputError if `low` does not hang below `high`."""
     way = sorted(structure.path(skeleton.parents, low))
     if high not in way:
         found = f"{skeleton.names[low]} does not hang below {skeleton.names[high]}"
@@ -132,11 +146,14 @@ def _between(skeleton: Skeleton, high: int, low: int) -> tuple[int, ...]:
 
 
 def _known(skeleton: Skeleton, members: dict[str, tuple[int, ...]]) -> dict[str, tuple[int, ...]]:
-    """Every joint with the chain of the nearest chain joint at or above it, the joints over the hips with the hip; and
-    the first joint of a limb also with the chain that it hangs on, which tells its place."""
+    """Assign every joint to the chain of the nearest chain joint at or above it, joints above the hips to the hip.
+
+    The first joint of a limb is also assigned to the chain that it hangs on, which determines its position.
+    """
     owner = {joint: name for name, joints in members.items() for joint in joints}
     found: dict[str, list[int]] = {name: [] for name in HIERARCHY}
     of: list[str] = []
+    # of[joint]: chain of the joint, inherited from its parent unless the joint is a chain member itself
     for joint, parent in enumerate(skeleton.parents):
         of.append(owner.get(joint, of[parent] if parent >= 0 else "hip"))
         found[of[-1]].append(joint)

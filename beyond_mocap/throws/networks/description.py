@@ -1,5 +1,8 @@
-"""All that is known of a throw or kick before it is generated (Fredriksson §7.1, §7.7): where hands and feet are to
-be, when the ball leaves, and what it is to hit; and the windows of it that networks see in each frame (eq. 7.1)."""
+"""Description of a throw or kick before it is generated, and the windows of it that networks receive in each frame.
+
+The description contains the positions of hands and feet, the release and the target.
+Source: Fredriksson sections 7.1 and 7.7, eq. 7.1.
+"""
 
 from __future__ import annotations
 
@@ -13,21 +16,27 @@ from ...motion.skeleton import frozen_array
 from .phases import motion_phase, warped_phase
 
 STEP = 0.1
-"""Seconds between two samples of a window: 20 frames of his 200 Hz."""
+"""Seconds between two samples of a window: 20 frames of Fredriksson's 200 Hz."""
 BACK, AHEAD = 2, 6
 SAMPLES = BACK + 1 + AHEAD
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Description:
-    """What a motion is to be, in the normalised frame: metres, Z up, floor at 0, the hips' first place over the
-    ground at the origin, +X from there to the impact.
+    """What a motion has to be, in the normalised frame: metres, Z up, floor at 0, X from the hips to the impact.
 
-    effectors: (T, 4, 3) m, places of left and right wrist, left and right toe. hands: (T, 2, 3, 3), rotations of the
-    hand joints in the world, or None. limb: which of `chains.EFFECTORS` throws or kicks. release: fractional frame at
-    which the ball leaves it. impact: (3,) m, what the ball is to hit. fps: frames per second. before (B, 4, 3), after
-    (A, 4, 3): places of the effectors in the frames beyond both ends, where they are known; else they are taken to
-    keep still."""
+    The origin is below the first position of the hips.
+
+    Attributes:
+        effectors: (T, 4, 3) m, positions of left and right wrist, left and right toe.
+        hands: (T, 2, 3, 3), world rotations of the hand joints, or None.
+        limb: index into `chains.EFFECTORS` of the limb that throws or kicks.
+        release: fractional frame at which the ball leaves.
+        impact: (3,) m, the point that the ball has to hit.
+        fps: frames per second.
+        before: (B, 4, 3) m, positions of the effectors in the frames before the first, or None: they do not move.
+        after: (A, 4, 3) m, positions of the effectors in the frames after the last, or None: they do not move.
+    """
 
     effectors: np.ndarray
     hands: np.ndarray | None
@@ -49,20 +58,25 @@ class Description:
             if array is not None and not (array.shape == shape and np.all(np.isfinite(array))):
                 raise InputError(f"description: {name}", f"shape {array.shape}", f"{shape}, finite")
         if count < 2 or self.limb not in range(4) or not 0.0 <= self.release <= count - 1 or not self.fps > 0:
-            found = f"{count} frames at {self.fps:g} a second, limb {self.limb}, release at frame {self.release:g}"
-            raise InputError("description", found, "two frames or more, a limb of 0 to 3, a release among the frames")
+            found = f"{count} frames at {self.fps:g} per second, limb {self.limb}, release at frame {self.release:g}"
+            raise InputError("description", found, "at least two frames, a limb of 0 to 3, a release within the frames")
 
     def __len__(self) -> int:
         return len(self.effectors)
 
 
 class Windows(NamedTuple):
-    """What networks are told of each frame n, leading axes free.
+    """Network inputs of each frame n, leading axes free.
 
-    points, deltas (..., 4, 9, 3) m: places of the effectors from 0.2 s before to 0.6 s after, and how far each goes
-    in the frame that follows. next (..., 4, 3) m: their places in frame n + 1. hands_next (..., 2, 3, 3): the hands'
-    rotations there, or None. sides (..., 2): b_l, b_r, which side throws or kicks. impact (..., 3) m. phase (...):
-    the motion phase."""
+    Attributes:
+        points: (..., 4, 9, 3) m, positions of the effectors from 0.2 s before to 0.6 s after.
+        deltas: (..., 4, 9, 3) m, their displacements in the following frame.
+        next: (..., 4, 3) m, their positions in frame n + 1.
+        hands_next: (..., 2, 3, 3), the hands' rotations in frame n + 1, or None.
+        sides: (..., 2), b_l and b_r, the side that throws or kicks.
+        impact: (..., 3) m.
+        phase: (...), the motion phase.
+    """
 
     points: np.ndarray
     deltas: np.ndarray
@@ -74,10 +88,15 @@ class Windows(NamedTuple):
 
 
 def windows(description: Description, reference: np.ndarray | None = None) -> Windows:
-    """The windows (T, ...) of all frames. reference: the speed curve for warped phases (§9.3), else eq. 7.2.
+    """Build the windows (T, ...) of all frames.
 
-    Between frames, places are linear; beyond the ends they are the known ones, then they keep still. The last frame's
-    `next` and `hands_next` are therefore the frame's own, or the first of `after`."""
+    Between frames, positions are interpolated linearly; beyond the known ones they do not move. The `next` and
+    `hands_next` of the last frame are therefore its own, or the first of `after`.
+
+    Args:
+        description: the description.
+        reference: (N,) speed curve for warped phases (section 9.3); None for phases by distance (eq. 7.2).
+    """
     frames = np.arange(len(description))
     seen = frames[:, None] + np.arange(-BACK, AHEAD + 1) * (STEP * description.fps)
     points = places_at(description, seen)
@@ -92,7 +111,7 @@ def windows(description: Description, reference: np.ndarray | None = None) -> Wi
 
 
 def phases(description: Description, reference: np.ndarray | None = None) -> np.ndarray:
-    """The motion phase (T,) of the throwing limb: by travelled distance, or warped to a reference curve."""
+    """Compute the motion phase (T,) of the throwing limb, by travelled distance or warped to a reference curve (N,)."""
     effector = description.effectors[:, description.limb]
     if reference is None:
         return motion_phase(effector, description.release, description.fps)
@@ -100,7 +119,7 @@ def phases(description: Description, reference: np.ndarray | None = None) -> np.
 
 
 def places_at(description: Description, frames: np.ndarray) -> np.ndarray:
-    """Places of the effectors (..., 4, 3) m at fractional frames (...), which may lie beyond both ends."""
+    """Interpolate the positions of the effectors (..., 4, 3) m at fractional frames (...), also beyond both ends."""
     before = np.zeros((0, 4, 3)) if description.before is None else description.before
     after = np.zeros((0, 4, 3)) if description.after is None else description.after
     known = np.concatenate([before, description.effectors, after])
@@ -111,7 +130,7 @@ def places_at(description: Description, frames: np.ndarray) -> np.ndarray:
 
 
 def scaled(description: Description, ratio: float) -> Description:
-    """The same movement of a body `ratio` times as large, with its target as far away in its own measure (§4.5)."""
+    """Scale a description to a body `ratio` times as large, and its target with it (section 4.5)."""
     larger = {
         name: None if getattr(description, name) is None else getattr(description, name) * ratio
         for name in ("effectors", "impact", "before", "after")

@@ -1,4 +1,4 @@
-"""One recorded or made throw or kick, as training and the search for a start pose take it."""
+"""One recorded or synthetic throw or kick, for training and for the choice of a start pose."""
 
 from __future__ import annotations
 
@@ -16,17 +16,25 @@ from .chains import EFFECTORS, chains_of
 from .description import AHEAD, BACK, STEP, Description
 from .kinematics import Pose, matrices, pose_of
 
-_NEAREST = 0.05  # metres over the ground from the hips to the impact: nearer ones give no direction
+_NEAREST = 0.05  # metres over the ground from the hips to the impact, below which the direction is undefined
 
 
 @dataclass(frozen=True, eq=False)
 class Example:
     """A throw or kick in the normalised frame (see `Description`).
 
-    name, subject: for reports, and for telling subjects apart. motion: at the model's rate. limb: index into
-    `EFFECTORS`. release: fractional frame at which the ball leaves. impact: (3,) m. launch: (3,) m/s, the ball's
-    velocity as it leaves, or None. stature: metres. before (B, 4, 3), after (A, 4, 3): places of the effectors beyond
-    the motion's ends, or None."""
+    Attributes:
+        name: name for reports.
+        subject: name of the performer, to distinguish subjects.
+        motion: at the model's rate.
+        limb: index into `EFFECTORS`.
+        release: fractional frame at which the ball leaves.
+        impact: (3,) m, target of the ball.
+        launch: (3,) m/s, velocity of the ball at the release, or None.
+        stature: metres.
+        before: (B, 4, 3) m, positions of the effectors before the motion's first frame, or None.
+        after: (A, 4, 3) m, positions of the effectors after the motion's last frame, or None.
+    """
 
     name: str
     subject: str
@@ -52,16 +60,27 @@ def example_of(
     name: str, subject: str, motion: Motion, limb: int | str, release: float, impact, launch=None, fps: float = 30.0,
     span: tuple[float, float] | None = None,
 ) -> Example:
-    """An example from a motion in the world, floor at 0.
+    """Build an example from a motion in the world, floor at 0.
 
-    limb: index or name of one of `EFFECTORS`. release: seconds from the motion's first frame. impact (3,) m and
-    launch (3,) m/s, in the world. span: first and last second that the example has, the whole motion without it; what
-    the motion shows beyond them is kept as `before` and `after`. InputError where the impact is on top of the hips,
-    or the skeleton lacks a limb."""
+    Args:
+        name: name for reports.
+        subject: name of the performer.
+        motion: the recording.
+        limb: index or name of one of `EFFECTORS`.
+        release: seconds from the motion's first frame.
+        impact: (3,) m, world.
+        launch: (3,) m/s, world, or None.
+        fps: frames per second of the example.
+        span: first and last second of the example, None for the whole motion; the motion beyond them is kept as
+            `before` and `after`.
+    Raises:
+        InputError: if the impact is above the hips, or the skeleton lacks a limb.
+    """
     first, last = (0.0, motion.duration) if span is None else (max(span[0], 0.0), min(span[1], motion.duration))
     count = int(np.floor((last - first) * fps + 1e-6)) + 1
     if count < 2:
-        raise InputError(f"example {name}", f"{last - first:.3f} s", "two frames or more", "take more of the recording")
+        raise InputError(f"example {name}", f"{last - first:.3f} s", "at least two frames",
+                         "include more of the recording")  # fmt: skip
     motion, turn, shift = _normalised(motion, np.asarray(impact, dtype=float), first * motion.fps, name)
     taken, before, after = (_resampled(motion, frames, first, fps) for frames in _frames(motion, first, count, fps))
     turned = quaternion.about_up(np.array(turn))
@@ -75,22 +94,27 @@ def example_of(
 
 
 def _normalised(motion: Motion, impact: np.ndarray, frame: float, name: str) -> tuple[Motion, float, np.ndarray]:
-    """The motion in the frame where the hips' place over the ground at `frame` is the origin and the impact lies on
-    +X; by which angle (radians) it was turned about the world's Z and by which vector (3,) m then moved."""
+    """Move a motion to the frame whose origin is below the hips at `frame` and whose +X points to the impact.
+
+    Returns:
+        The motion, the angle (rad) of its rotation about the world's Z, and the translation (3,) m after it.
+    """
     root, rotations = cubic_at(motion, np.array([frame]))
     places, _ = forward_kinematics(Motion(motion.skeleton, root, rotations, motion.fps))
     hips = places[0, identify(motion.skeleton).hips] * (1.0, 1.0, 0.0)
     way = impact - hips
     if not np.hypot(way[0], way[1]) > _NEAREST:
-        raise InputError(f"example {name}", "a target right above or below the hips", "one some way off")
+        raise InputError(f"example {name}", "a target directly above or below the hips", "a target some distance away")
     turn = -float(np.arctan2(way[1], way[0]))
     shift = -quaternion.rotate(quaternion.about_up(np.array(turn)), hips)
     return place(motion, turn, shift), turn, shift
 
 
 def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.ndarray]:
-    """Of an example of `count` frames from second `first`: its frames, those known before it and those after it, at
-    `fps`, as far as windows see."""
+    """List the frames of an example, those known before it and those known after it, at `fps`.
+
+    The example has `count` frames from second `first`; the others are limited to what windows include.
+    """
     last = int(np.floor((motion.duration - first) * fps + 1e-6))
     back = min(int(np.floor(first * fps + 1e-6)), int(np.ceil(BACK * STEP * fps)))
     ahead = min(last, count - 1 + int(np.ceil(AHEAD * STEP * fps)) + 1)
@@ -98,7 +122,7 @@ def _frames(motion: Motion, first: float, count: int, fps: float) -> list[np.nda
 
 
 def _resampled(motion: Motion, frames: np.ndarray, first: float, fps: float) -> Motion | None:
-    """Frames (N,) counted at `fps` from second `first`, or None where there are none."""
+    """Resample a motion at frames (N,) counted at `fps` from second `first`; None if there are none."""
     if not len(frames):
         return None
     root, rotations = cubic_at(motion, (first + frames / fps) * motion.fps)
@@ -106,12 +130,12 @@ def _resampled(motion: Motion, frames: np.ndarray, first: float, fps: float) -> 
 
 
 def effectors_of(motion: Motion) -> np.ndarray:
-    """Places (T, 4, 3) m of the wrists and toes."""
+    """Compute the positions (T, 4, 3) m of the wrists and toes."""
     return forward_kinematics(motion)[0][:, list(chains_of(motion.skeleton).effectors)]
 
 
 def describe(example: Example) -> Description:
-    """What is known of the example's motion before it is generated."""
+    """Build the description of an example: what is known of its motion before it is generated."""
     places, turns = forward_kinematics(example.motion)
     joints = list(chains_of(example.motion.skeleton).effectors)
     return Description(
@@ -122,14 +146,14 @@ def describe(example: Example) -> Description:
 
 
 def poses(example: Example) -> Pose:
-    """The states (T, ...) of the example's body; `moved` is backward, nothing in the first frame."""
+    """Compute the states (T, ...) of an example's body; `moved` is backward, zero in the first frame."""
     motion = example.motion
     pose = pose_of(motion.skeleton, motion.root_positions, matrices(motion))
     return pose._replace(moved=np.diff(pose.positions, axis=0, prepend=pose.positions[:1]))
 
 
 def mirrored(example: Example) -> Example:
-    """The same throw with the other arm, or kick with the other leg."""
+    """Mirror an example: the same throw with the other arm, or kick with the other leg."""
     def side(effectors):
         return None if effectors is None else effectors[:, [1, 0, 3, 2]] * (1.0, -1.0, 1.0)
 

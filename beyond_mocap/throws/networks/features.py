@@ -1,35 +1,35 @@
-"""What each network is told and what it answers (Fredriksson §7.2, §7.3), and how answers become a pose (`answers`).
+"""Inputs of each network (Fredriksson sections 7.2 and 7.3); `network_output` converts their outputs to a pose.
 
-All functions are pure, take `xp` (numpy or jax.numpy) last and leave leading axes free. A network speaks of frame n + 1
-out of frame n: `pose` is the state in n, `after` what is known of n + 1 so far, in the order of `HIERARCHY`.
+All functions are pure, take `xp` (numpy or jax.numpy) last and leave leading axes free. A network predicts frame n +
+1 from frame n: `pose` is the state in n, `after` what is known of n + 1 so far, in the order of `HIERARCHY`.
 
     after = pose
     for name in HIERARCHY:
-        x = network_input(name, chains, settings, pose, after, window)
-        after = answered(name, chains, settings, y(x), pose, after, window)
+        x = build_input(name, chains, settings, pose, after, window)
+        after = apply_output(name, chains, settings, y(x), pose, after, window)
 
-Where the text leaves something open, this is what was decided:
+Decisions where the text leaves something open:
 
 - **Hip**: its 14 joints are the hips, the chest, and upper, middle and end joint of each limb (of legs the ankle).
-- **Static frame** (`frame="static"`, his): the normalised frame. `frame="hip"` (ours): the same, moved so that the
-  hips of frame n stand over the origin, so that a run-up may go anywhere.
-- **Reference frame of a chain**: place and turn of the joint that it hangs on, in frame n + 1; trajectories, impact
-  and joints "in absolute form" are given in it, those of frame n too. δa_o: the turn from the frame's axes in n to
-  those in n + 1, seen in n, as six numbers less those of no turn. His "delta axis" is a difference of world axes;
-  this one does not change when the world turns.
+- **Static frame** (`frame="static"`, as in the thesis): the normalised frame. `frame="hip"` (this project): the
+  same, moved so that the hips of frame n are above the origin, so that a run-up may go anywhere.
+- **Reference frame of a chain**: position and rotation of the joint that the chain hangs on, in frame n + 1;
+  trajectories, impact and joints "in absolute form" are given in it, those of frame n too. δa_o: the rotation from
+  the frame's axes in n to those in n + 1, in the axes of n, as six numbers minus those of the identity. The thesis'
+  "delta axis" is a difference of world axes; this one does not change when the world rotates.
 - **Body**: the 8 joints outside it are elbows, wrists, knees and ankles, in frame n.
-- **Arm**: d is from the upper arm to where the wrist is to be in n + 1; the wrist's rotation r¹ is that of the hand
-  in the reference frame, because the lower arm that it would be relative to is what is asked for. p_i¹ are the hips
-  and the body's joints except the reference itself, a_k¹ those of hips and body.
+- **Arm**: d is from the upper arm to the target of the wrist in n + 1; the wrist's rotation r¹ is that of the hand
+  in the reference frame, because the lower arm that it would be relative to is what the network predicts. p_i¹ are
+  the hips and the body's joints except the reference itself, a_k¹ those of hips and body.
 - **Leg**: p_i¹ are the head and both shoulders (upper arms), a_k¹ six joints of the body: lowest, chest, both joints
   that carry the arms, neck, head.
-- **Guided** (`guided`, ours; §9.3 wished for networks that know inverse kinematics): limbs are also told the rotations
-  r by which the limb of frame n, as it hangs on its reference in n + 1, would reach the wanted place (`reached`). The
-  network says what it wants with them; nothing is corrected afterwards.
-- **Carried** (`carried`, ours): the hip network is also told where the hips of frame n would be if they went along with
-  hands and feet (`carry_hips`). The ground under the hips as in all that it is told.
+- **Guided** (`guided`, this project; section 9.3 suggests networks that know inverse kinematics): limb networks also
+  receive the rotations r by which the limb of frame n, as it hangs on its reference in n + 1, would reach its target
+  (`compute_reach_guide`). The network decides how to use them; nothing is corrected afterwards.
+- **Carried** (`carried`, this project): the hip network also receives where the hips of frame n would be if they
+  moved along with hands and feet (`carry_hips`). Measured from below the hips, as all its inputs.
 - **Wrist inferred**: no r¹, and the hand's relative rotation joins those of the arm, in input and output.
-- **Phase**: of a leg, that of d in n + 1, which stands in the input; of all others the motion phase of frame n.
+- **Phase**: for a leg, that of d in n + 1, which is part of the input; for all others the motion phase of frame n.
 """
 
 from __future__ import annotations
@@ -48,13 +48,23 @@ from .model import SINGLE, ModelSettings
 from .phases import distance_phase
 
 HIP_GUIDES = 9
-"""Values that `carry_hips` has."""
-_COUNTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # feet stand, hands swing
-_TINY = 1e-12  # m^2 about their middle; keeps the root's derivative finite
+"""Number of values that `carry_hips` returns."""
+_COUNTS = np.array([1.0, 1.0, 3.0, 3.0]) / 8.0  # weights of both hands and both feet: feet are planted, hands swing
+_TINY = 1e-12  # m^2; keeps the derivative of the square root finite
 
 
 def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
-    """The input x (..., in) of a network of `settings.networks`."""
+    """Build the input x (..., in) of a network of `settings.networks`.
+
+    Args:
+        name: name of the network.
+        chains: chains of the skeleton.
+        settings: settings of the model.
+        pose: state in frame n.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        xp: numpy or jax.numpy.
+    """
     if name == SINGLE:
         return single_input(chains, settings, pose, window, xp)
     if name == "hip":
@@ -72,14 +82,23 @@ def network_input(name: str, chains: Chains, settings: ModelSettings, pose: Pose
 
 
 def phase_of(name: str, chains: Chains, after: Pose, window: Windows, leg_reach, xp=np):
-    """The phase (...) at which a network is asked. leg_reach: {"left": (shortest, longest), "right": ...} m."""
+    """Compute the phase (...) at which a network is evaluated.
+
+    Args:
+        name: name of the network.
+        chains: chains of the skeleton.
+        after: what is known of frame n + 1 so far.
+        window: network inputs of frame n.
+        leg_reach: {"left": (shortest, longest), "right": ...} m.
+        xp: numpy or jax.numpy.
+    """
     if name not in LIMB_OF[2:]:
         return window.phase
     return distance_phase(stretch(LIMB_OF.index(name), chains, after, window, xp)[..., 0], leg_reach[name[:-4]], xp)
 
 
 def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
-    """(b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (§7.3)."""
+    """Build (b_l, b_r, i, four trajectories, p_j, a_j), j = 14 (section 7.3)."""
     told = [*_motion(chains, settings, pose, window, xp), *_joints(chains, settings, pose, chains.hip_sees, xp)]
     if settings.carried:
         told.append(carry_hips(chains, pose, window, origin(chains, settings, pose), xp))
@@ -87,14 +106,20 @@ def hip_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windo
 
 
 def single_input(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp=np):
-    """(b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move, 25 with him (§7.2)."""
+    """Build (b_l, b_r, i, four trajectories, p_j, a_j, v_j), j = all joints that networks move.
+
+    Source: Fredriksson section 7.2, where j = 25.
+    """
     parts = _joints(chains, settings, pose, chains.joints, xp)
     moved = flat(picked(pose.moved, chains.joints, -2, xp), 2)
     return xp.concatenate([*_motion(chains, settings, pose, window, xp), *parts, moved], axis=-1)
 
 
 def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
-    """(b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), j = 10 with him, i = 8 (§7.3)."""
+    """Build (b_l, b_r, i, both wrists' trajectories, o of both toes, δa_o, r_j, p_i, a_i), i = 8.
+
+    Source: Fredriksson section 7.3, where j = 10.
+    """
     frame = _Frame(chains.references["body"], pose, after, xp)
     seen = chains.body_sees
     return xp.concatenate([
@@ -110,7 +135,10 @@ def body_input(chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
 
 
 def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
-    """(b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of the arm 0 (left) or 1 (§7.3)."""
+    """Build (b_l, b_r, t_wrist, o_wrist, δa_o, r_wrist¹, d, r_upper, r_lower, p_i¹, a_k¹) of arm 0 or 1.
+
+    Source: Fredriksson section 7.3.
+    """
     name = LIMB_OF[number]
     frame = _Frame(chains.references[name], pose, after, xp)
     given = settings.wrist == "given"
@@ -129,7 +157,10 @@ def arm_input(number: int, chains: Chains, settings: ModelSettings, pose: Pose, 
 
 
 def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Windows, xp=np):
-    """(t_toe, o_toe, δa_o, d, r_j, p_i¹, a_k¹), j = 4, i = 3, k = 6, of the leg 2 (left) or 3 (§7.3)."""
+    """Build (t_toe, o_toe, δa_o, d, r_j, p_i¹, a_k¹), j = 4, i = 3, k = 6, of leg 2 (left) or 3 (right).
+
+    Source: Fredriksson section 7.3.
+    """
     name = LIMB_OF[number]
     frame = _Frame(chains.references[name], pose, after, xp)
     others = (chains.head, *chains.sockets[:2])
@@ -145,8 +176,10 @@ def leg_input(number: int, chains: Chains, pose: Pose, after: Pose, window: Wind
 
 
 def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, after: Pose, window: Windows, xp=np):
-    """Relative rotations (..., 6 each) that two-bone inverse kinematics gives the limb of frame n for the place where
-    its end is wanted in n + 1: of the joints that its network speaks of."""
+    """Compute the relative rotations (..., 6 each) with which the limb of frame n would reach its target in n + 1.
+
+    They are those of the joints that the limb's network predicts, by two-bone inverse kinematics.
+    """
     name = LIMB_OF[number]
     local = {joint: pose.local[..., joint, :, :] for joint in chains.members[name]}
     limb = spread(chains.skeleton, after, chains.known[name], root=after.root, local=local, given={}, xp=xp)
@@ -156,7 +189,7 @@ def reached(number: int, chains: Chains, settings: ModelSettings, pose: Pose, af
 
 
 def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
-    """How many of a network's last inputs are what `reached` or, of the hip, `carry_hips` says."""
+    """Count the last inputs of a network that come from `compute_reach_guide` or, for the hip, from `carry_hips`."""
     if name == "hip":
         return HIP_GUIDES if settings.carried else 0
     return 6 * len(predicted(name, chains, settings)) if settings.guided and name in LIMB_OF else 0
@@ -164,12 +197,12 @@ def guides(name: str, chains: Chains, settings: ModelSettings) -> int:
 
 @lru_cache(maxsize=16)
 def _hinges(chains: Chains) -> np.ndarray:
-    """Axes (4, 3) of elbows and knees; they count where a limb is straight."""
+    """Find the axes (4, 3) of elbows and knees; they count where a limb is straight."""
     return hinge_axes(chains, None)
 
 
 def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]]:
-    """Length of input and output of each network."""
+    """Count inputs and outputs of each network: {name: (in, out)}."""
     local = np.broadcast_to(np.eye(3), (len(chains.skeleton), 3, 3))
     pose = pose_of(chains.skeleton, np.zeros(3), local)
     window = Windows(
@@ -184,7 +217,14 @@ def widths(chains: Chains, settings: ModelSettings) -> dict[str, tuple[int, int]
 
 
 class _Frame:
-    """The reference frame of a chain: its joint in frame n + 1; `turned` (..., 6) is δa_o."""
+    """The reference frame of a chain: its joint in frame n + 1.
+
+    Attributes:
+        origin: (..., 3) m.
+        axes: (..., 3, 3).
+        inverse_axes: (..., 3, 3).
+        axes_change: (..., 6), δa_o.
+    """
 
     def __init__(self, joint: int, pose: Pose, after: Pose, xp):
         self.xp = xp
@@ -195,35 +235,35 @@ class _Frame:
         self.turned = six(step - np.eye(3), xp)
 
     def place(self, place):
-        """(..., 3) world -> this frame."""
+        """Convert a position (..., 3) m from the world to this frame."""
         return self.xp.matmul(self.back, (place - self.origin)[..., None])[..., 0]
 
     def places(self, places):
-        """(..., N, 3) world -> this frame."""
+        """Convert positions (..., N, 3) m from the world to this frame."""
         return self.xp.matmul(places - self.origin[..., None, :], self.axes)
 
     def ways(self, ways):
-        """Differences (..., N, 3) world -> this frame."""
+        """Convert vectors (..., N, 3) m from the world to this frame."""
         return self.xp.matmul(ways, self.axes)
 
     def turn(self, turn):
-        """(..., 3, 3) world -> this frame."""
+        """Convert a rotation (..., 3, 3) from the world to this frame."""
         return self.xp.matmul(self.back, turn)
 
     def turns(self, turns):
-        """(..., N, 3, 3) world -> this frame."""
+        """Convert rotations (..., N, 3, 3) from the world to this frame."""
         return self.xp.matmul(self.back[..., None, :, :], turns)
 
 
 def _trajectory(frame: _Frame, window: Windows, number: int):
-    """t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
+    """Build t of one effector, 54 values, in a chain's frame (eq. 7.1)."""
     points = frame.places(window.points[..., number, :, :])
     deltas = frame.ways(window.deltas[..., number, :, :])
     return flat(frame.xp.concatenate([points, deltas], axis=-2), 2)
 
 
 def _motion(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows, xp) -> list:
-    """x_m of hip and single: b_l, b_r, i and four trajectories, in the world or from under the hips."""
+    """Build x_m of hip and single: b_l, b_r, i and four trajectories, measured from `compute_origin`."""
     start = origin(chains, settings, pose)
     points = window.points - start[..., None, None, :]
     trajectories = xp.concatenate([points, window.deltas], axis=-2)
@@ -231,22 +271,32 @@ def _motion(chains: Chains, settings: ModelSettings, pose: Pose, window: Windows
 
 
 def _joints(chains: Chains, settings: ModelSettings, pose: Pose, joints: tuple[int, ...], xp) -> list:
-    """p_j and a_j of hip and single."""
+    """Build p_j and a_j of hip and single."""
     places = picked(pose.positions, joints, -2, xp) - origin(chains, settings, pose)[..., None, :]
     return [flat(places, 2), flat(six(picked(pose.turns, joints, -3, xp), xp), 2)]
 
 
 def stretch(number: int, chains: Chains, after: Pose, window: Windows, xp=np):
-    """d: metres (..., 1) from a limb's first joint to where its end is to be in frame n + 1."""
+    """Measure d: metres (..., 1) from a limb's first joint to the target of its end in frame n + 1."""
     way = window.next[..., number, :] - after.positions[..., chains.sockets[number], :]
     return xp.sqrt(xp.sum(way * way, axis=-1, keepdims=True))
 
 
 def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
-    """Place less `origin` (..., 3) m, and turn as six numbers, of the hips as hands and feet carry them: (..., 9).
+    """Compute the hips as hands and feet carry them from frame n to n + 1.
 
-    They are turned about the upright and moved as brings the effectors of frame n nearest to where they are wanted in
-    n + 1, in least squares in which feet count three times as much (Procrustes; Kabsch 1976 with one axis)."""
+    The hips are rotated about the vertical and moved as brings the effectors of frame n nearest to their targets in
+    n + 1, by least squares in which feet count three times as much (Procrustes; Kabsch 1976 with one axis).
+
+    Args:
+        chains: chains of the skeleton.
+        pose: state in frame n.
+        window: network inputs of frame n.
+        origin: (..., 3) m, subtracted from the position.
+        xp: numpy or jax.numpy.
+    Returns:
+        (..., 9): position less `origin`, and rotation as six numbers.
+    """
     now = picked(pose.positions, chains.effectors, -2, xp)
     share = _COUNTS[:, None]
     middle, wanted = (now * share).sum(-2), (window.next * share).sum(-2)
@@ -259,7 +309,7 @@ def carry_hips(chains: Chains, pose: Pose, window: Windows, origin, xp=np):
 
 
 def _about_up(along, across, xp):
-    """Rotations (..., 3, 3) about the upright whose cosine and sine are as `along` (...) to `across` (...)."""
+    """Build rotations (..., 3, 3) about the vertical by the angle of (`along`, `across`), both (...)."""
     long = xp.sqrt(along * along + across * across + _TINY)
     cosine, sine, nothing = along / long, across / long, xp.zeros_like(along)
     rows = [[cosine, -sine, nothing], [sine, cosine, nothing], [nothing, nothing, nothing + 1.0]]

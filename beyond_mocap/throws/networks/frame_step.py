@@ -1,6 +1,9 @@
-"""One frame after the other: what the networks say of the next frame, brought within the joints' limits and towards
-where hands and feet are wanted (Fredriksson §7.7). A hierarchy is asked by `OneFrame`, which says the same as
-`features` and `answers` do, without free axes and jax, as fast as numpy goes; tests hold both together."""
+"""Predict one frame after another, within the joints' limits and towards the targets of hands and feet.
+
+`HierarchyPredictor` evaluates a hierarchy with the same result as `features` and `network_output`, without free axes
+and jax, as fast as numpy allows; tests compare both.
+Source: Fredriksson section 7.7.
+"""
 
 from __future__ import annotations
 
@@ -20,22 +23,28 @@ from .model import SINGLE, ThrowModel
 from .phases import weigh_points_at
 
 _SETTLES = 0.12
-"""Seconds in which tanh brings an offset trajectory back to the wanted one by three quarters (§7.7.3)."""
+"""Seconds in which tanh moves an offset trajectory back to the requested one by three quarters (section 7.7.3)."""
 
 _FELT = 2e-3
-"""Radians that a limit takes off a joint from where its limb reaches again."""
+"""Radians of limit correction above which the limbs reach again."""
 
-_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # no turn
+_SIX = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # the identity rotation
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 _TINY = 1e-12
 _GROUND = np.array([1.0, 1.0, 0.0])
 
 
 class Step(NamedTuple):
-    """The next frame. pose: as it is to be. state: what the frame after is predicted from: the pose, or for a single
-    network without inverse kinematics its own floating places (§7.2). predicted (4, 3) m: where the networks had the
-    effectors. over (J,): radians by which joints were beyond their limits. floating (j, 3) m: the places that a
-    single network says, or None."""
+    """The next frame.
+
+    Attributes:
+        pose: the resulting pose.
+        state: state from which the following frame is predicted: the pose, or for a single network without inverse
+            kinematics its own inconsistent positions (section 7.2).
+        predicted: (4, 3) m, positions of the effectors as predicted by the networks.
+        over: (J,) rad by which joints were beyond their limits.
+        floating: (j, 3) m, positions predicted by a single network, or None.
+    """
 
     pose: Pose
     state: Pose
@@ -45,10 +54,10 @@ class Step(NamedTuple):
 
 
 class Stepper:
-    """A model made ready to say one frame after the other."""
+    """A model prepared to predict one frame after another."""
 
     def __init__(self, model: ThrowModel):
-        """InputError where networks are told other than their settings say."""
+        """Prepare the model; InputError if the networks' inputs and outputs do not match its settings."""
         self.model = model
         self.chains = chains_of(model.skeleton)
         _check_widths(model, self.chains)
@@ -59,9 +68,15 @@ class Stepper:
         self.reach = LimbReach(self.chains, self.limits, model.settings.wrist == "given")
 
     def step(self, pose: Pose, window: Windows, wanted: np.ndarray, share: np.ndarray | None, limited: bool) -> Step:
-        """Frame n + 1 from the pose and window of n. wanted (4, 3) m: where the effectors are to be; share (4,): how
-        much of the way from what the networks say to there each is taken, None for none of them. limited: joints are
-        kept within their limits, and networks asked only for what is near what they know."""
+        """Predict frame n + 1 from the pose and window of frame n.
+
+        Args:
+            pose: state in frame n.
+            window: network inputs of frame n.
+            requested: (4, 3) m, targets of the effectors.
+            share: (4,) share of the distance from prediction to target that each effector moves, None for none.
+            limited: joints stay within their limits, and network inputs near the training data.
+        """
         after, floating = self.predicted(pose, window, limited)
         said = after.positions[self.effectors] if floating is None else floating[self.floating_effectors]
         over = np.zeros(len(self.model.skeleton))
@@ -75,8 +90,15 @@ class Stepper:
         return Step(after, state._replace(moved=state.positions - pose.positions), said, over, floating)
 
     def predicted(self, pose: Pose, window: Windows, bounded: bool) -> tuple[Pose, np.ndarray | None]:
-        """What the networks say of the next frame; of a single network also the places of the joints that it moves.
-        bounded: they are not asked for what lies far from all that they have seen."""
+        """Predict the next frame with the networks alone.
+
+        Args:
+            pose: state in frame n.
+            window: network inputs of frame n.
+            bounded: limit the inputs to what is near the training data.
+        Returns:
+            The pose, and for a single network the positions (j, 3) m of the joints that it moves.
+        """
         if self.hierarchy is not None:
             return self.hierarchy(pose, window, bounded), None
         network, settings = self.model.networks[SINGLE], self.model.settings
@@ -87,13 +109,13 @@ class Stepper:
         return answers.answered(SINGLE, self.chains, settings, y=y, pose=pose, after=pose, window=window), floating
 
     def _afloat(self, pose: Pose, floating: np.ndarray) -> Pose:
+        """Replace the positions of the joints that the single network moves."""
         places = pose.positions.copy()
         places[list(self.chains.joints)] = floating
         return pose._replace(positions=places)
 
     def _within_reach(self, after: Pose, wanted: np.ndarray, share: np.ndarray) -> tuple[Pose, np.ndarray]:
-        """The pose with limbs that reach and joints within their limits; where a limit has a say, limbs reach again
-        with what is left to them."""
+        """Reach with the limbs and limit the joints; reach again with the rest where a limit changed a joint."""
         after, over = self._limited(self.reach(after, wanted, share))
         if over.max() > _FELT:
             after, more = self._limited(self.reach(after, wanted, share))
@@ -101,17 +123,19 @@ class Stepper:
         return after, over
 
     def _limited(self, pose: Pose) -> tuple[Pose, np.ndarray]:
+        """Limit the joints of a pose; also return the excess (J,) rad."""
         local, over = self.limits.within(pose.local)
         return (pose, over) if local is pose.local else (posed(self.chains, pose.root, local), over)
 
 
 @lru_cache(maxsize=8)
 def stepper(model: ThrowModel) -> Stepper:
-    """The model made ready; kept, as models are asked again and again."""
+    """Prepare a model; cached, since models are evaluated repeatedly."""
     return Stepper(model)
 
 
 def _check_widths(model: ThrowModel, chains: Chains) -> None:
+    """Raise InputError if inputs or outputs of a network do not match the settings on this skeleton."""
     for name, (inputs, outputs) in features.widths(chains, model.settings).items():
         network = model.networks[name]
         if (network.inputs, network.outputs) != (inputs, outputs):
@@ -122,7 +146,7 @@ def _check_widths(model: ThrowModel, chains: Chains) -> None:
 
 
 def _limits_of(model: ThrowModel) -> np.ndarray:
-    """The model's joint limits, or those of its examples."""
+    """Return the model's joint limits, or estimate them from its examples."""
     if model.joint_limits is not None:
         return model.joint_limits
     free = (0, *stillness(model))
@@ -130,15 +154,18 @@ def _limits_of(model: ThrowModel) -> np.ndarray:
 
 
 def stillness(model: ThrowModel) -> tuple[int, ...]:
-    """Joints without limits besides the root: those between it and the hips, and the hips."""
+    """List the joints without limits besides the root: those between it and the hips, and the hips."""
     chains = chains_of(model.skeleton)
     return (*chains.above, chains.hips)
 
 
 @lru_cache(maxsize=8)
 def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """How much of an offset is left at a window's samples (9, 1), how much less a frame later (9, 1), and in the next
-    frame."""
+    """Compute how an offset fades over a window.
+
+    Returns:
+        Remaining share at the samples (9, 1), its change one frame later (9, 1), and the share in the next frame.
+    """
     seconds = (np.arange(SAMPLES) - BACK) * STEP
 
     def left(t):
@@ -148,8 +175,14 @@ def _fading(fps: float) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
-    """The window with its trajectories led through where the effectors are, offset (4, 3) m from where they are wanted,
-    and back to the wanted ones by tanh (§7.7.3)."""
+    """Blend a window's trajectories from the current positions of the effectors to the requested ones by tanh.
+
+    Args:
+        window: network inputs of the frame.
+        offset: (4, 3) m, current minus requested positions.
+        fps: frames per second.
+    Source: Fredriksson section 7.7.3.
+    """
     left, change, following = _fading(fps)
     return window._replace(
         points=window.points + offset[:, None, :] * left, deltas=window.deltas + offset[:, None, :] * change,
@@ -158,10 +191,10 @@ def blended(window: Windows, offset: np.ndarray, fps: float) -> Windows:
 
 
 class OneFrame:
-    """The networks of a hierarchy, ready to say one frame after the other. It keeps nothing between frames."""
+    """The networks of a hierarchy, prepared to predict one frame after another. Keeps no state between frames."""
 
     def __init__(self, model: ThrowModel, chains: Chains):
-        """`model`: of kind hierarchy. `chains`: of its skeleton."""
+        """Prepare a `model` of kind hierarchy; `chains` are those of its skeleton."""
         settings = model.settings
         self.chains, self.points = chains, settings.points
         self.static, self.given = settings.frame == "static", settings.wrist == "given"
@@ -182,8 +215,10 @@ class OneFrame:
         self.guide = LimbReach(chains, None, True) if settings.guided else None
 
     def __call__(self, pose: Pose, window: Windows, bounded: bool = False) -> Pose:
-        """Frame n + 1 from the state and the window of n, both of one frame. `moved` stays that of n. bounded: networks
-        are asked nothing that lies further off than `network.BOUND` (`PhaseNetwork.bounds`)."""
+        """Predict frame n + 1 from the state and the window of frame n, both of one frame.
+
+        `moved` stays that of n. With `bounded`, inputs are limited to `PhaseNetwork.input_bounds`.
+        """
         theta = np.array(weigh_points_at(float(window.phase), self.points), np.float32)
         after = Pose(pose.root, pose.local.copy(), pose.positions.copy(), pose.turns.copy(), pose.moved)
         sixes = pose.turns.swapaxes(1, 2)[:, :2].reshape(-1, 6)
@@ -201,11 +236,13 @@ class OneFrame:
         return after
 
     def _ask(self, number: int, x: np.ndarray, theta: np.ndarray, bounded: bool) -> np.ndarray:
+        """Evaluate network `number` of the hierarchy."""
         if bounded:
             x = np.minimum(np.maximum(x, self.bounds[number][0]), self.bounds[number][1])
         return self.networks[number](x, theta)
 
     def _hip_input(self, pose: Pose, window: Windows, sixes: np.ndarray) -> np.ndarray:
+        """Build the input of the hip network."""
         start = pose.positions[self.chains.hips] * (0.0 if self.static else _GROUND)
         trajectories = np.concatenate([window.points - start, window.deltas], axis=1)
         places = pose.positions[self.hip_sees] - start
@@ -213,7 +250,7 @@ class OneFrame:
         return _row(window.sides, window.impact - start, trajectories, places, sixes[self.hip_sees], *guide)
 
     def _hips(self, after: Pose, y: np.ndarray, pose: Pose) -> Pose:
-        """The body with its hips where the first network says; joints above them only move."""
+        """Place the hips where the first network predicts them; joints above them only move."""
         y, hips, offsets = y.astype(float), self.chains.hips, self.chains.skeleton.offsets
         place = y[:3] + (0.0 if self.static else pose.positions[hips] * _GROUND)
         turn = _rotations(y[3:])[0]
@@ -227,6 +264,7 @@ class OneFrame:
         return after
 
     def _body_input(self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray) -> np.ndarray:
+        """Build the input of the body network."""
         joint = self.chains.references["body"]
         origin, axes = after.positions[joint], after.turns[joint]
         trajectories = np.concatenate([window.points[:2] - origin, window.deltas[:2]], axis=1) @ axes
@@ -239,9 +277,11 @@ class OneFrame:
     def _limbs(
         self, pose: Pose, after: Pose, window: Windows, relative: np.ndarray, theta: np.ndarray, bounded: bool
     ) -> np.ndarray:
-        """What the networks of arms and legs say, one after the other: (rotations * 6,)."""
+        """Evaluate the networks of arms and legs: (rotations * 6,), one limb after the other."""
+        # leading axis 4: left arm, right arm, left leg, right leg; [:2] are the arms, [2:] the legs
         origins, axes = after.positions[self.references][:, None], after.turns[self.references]
         back = axes.swapaxes(1, 2)
+        # per limb 9 points, 9 deltas and the next position, in the axes of its reference joint
         ways = np.concatenate([window.points - origins, window.deltas, window.next[:, None] - origins], axis=1) @ axes
         turned = _six(pose.turns[self.references].swapaxes(1, 2) @ axes) - _SIX
         sockets = after.positions[self.sockets]
@@ -262,8 +302,10 @@ class OneFrame:
         return np.concatenate(answers)
 
     def _guides(self, after: Pose, window: Windows) -> list[list[np.ndarray]]:
-        """Of each limb what `features.reached` says, nothing where the model is not guided. The limbs in `after` are
-        left as they hang on the body of the next frame with the rotations of this one."""
+        """Build what `features.compute_reach_guide` returns for each limb, empty if the model is not guided.
+
+        The limbs in `after` are left as they hang on the body of the next frame with the rotations of this one.
+        """
         if self.guide is None:
             return [[]] * 4
         for name in LIMB_OF:
@@ -272,14 +314,16 @@ class OneFrame:
         return [[sixes[said]] for said in self.said[2:]]
 
     def _leg_theta(self, number: int, stretch: float) -> np.ndarray:
-        """Control point weights of a leg that reaches `stretch` metres (eq. 7.3)."""
+        """Compute the control point weights of a leg stretched to `stretch` metres (eq. 7.3)."""
         low, high = self.reach[number - 2]
         return np.array(weigh_points_at((float(stretch) - low) / (high - low), self.points), np.float32)
 
 
 def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[int, np.ndarray]) -> None:
-    """Puts the joints of a plan (joint, parent, offset), parents first, in `after` itself, where its local rotations
-    bring them. given: turns in the world."""
+    """Update the joints of a plan (joint, parent, offset), parents first, in `after` itself.
+
+    Local rotations are those of `after`; `given` contains world rotations, which replace them.
+    """
     local, places, turns = after.local, after.positions, after.turns
     for joint, parent, offset in plan:
         if parent < 0:
@@ -296,17 +340,17 @@ def _spread(plan: list[tuple[int, int, np.ndarray]], after: Pose, given: dict[in
 
 
 def _row(*parts: np.ndarray) -> np.ndarray:
-    """Parts as one input, float32."""
+    """Join arrays to one input row, float32."""
     return np.concatenate([part.reshape(-1) for part in parts], dtype=np.float32, casting="same_kind")
 
 
 def _six(turns: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) as (..., 6)."""
+    """Convert rotations (..., 3, 3) to six numbers (..., 6)."""
     return turns.swapaxes(-1, -2)[..., :2, :].reshape(*turns.shape[:-2], 6)
 
 
 def _rotations(values: np.ndarray) -> np.ndarray:
-    """The rotations (N, 3, 3) nearest to values (6 N,): Gram-Schmidt, the x axis first."""
+    """Convert values (6 N,) to the nearest rotations (N, 3, 3): Gram-Schmidt, the x axis first."""
     both = values.astype(float).reshape(-1, 2, 3)
     first, second = both[:, 0], both[:, 1]
     first = first / np.sqrt((first * first).sum(1)[:, None] + _TINY)

@@ -1,8 +1,8 @@
-"""A throw or kick out of its description: a start pose from the examples, then one frame after the other (Fredriksson
-§7.7).
+"""Generate a throw or kick from its description: a start pose from the examples, then one frame after another.
 
-The start pose is, of all frames of the examples, the one whose hands and feet lie and move most as they are to at the
-beginning (§7.7.1).
+The start pose is the frame of all examples whose hands and feet have the most similar positions and velocities to
+those at the beginning of the description (section 7.7.1).
+Source: Fredriksson section 7.7.
 """
 
 from __future__ import annotations
@@ -22,25 +22,30 @@ from .frame_step import Step, Stepper, blended, stepper
 from .kinematics import Pose, matrices, motion_of, places_and_turns
 from .model import ThrowModel
 
-_STILL, _MOVING = 0.15, 0.6  # m/s: a toe that is to be slower stands, a faster one does not
-_LOW = 0.03  # metres above its lowest place up to which a toe may stand
-_FARTHEST = 1e4  # metres from where it began at which a body is lost
-_PATIENCE = 8  # iterations of the start pose that may pass without a millimetre's gain
+_STILL, _MOVING = 0.15, 0.6  # m/s of a toe: slower ones are in contact with the ground, faster ones are not
+_LOW = 0.03  # metres above its lowest position up to which a toe may be in contact
+_FARTHEST = 1e4  # metres from the origin beyond which the generated body is invalid
+_PATIENCE = 8  # iterations of the start pose allowed without an improvement of a millimetre
 
 _SECONDS = 0.12  # a difference in velocity counts as the distance it makes in this time
-_TURN = 0.25  # m that a turn by one radian costs: a body that faces elsewhere throws otherwise
-_LATE = 0.5  # m that a frame at the end of its example costs at the beginning of a movement
+_TURN = 0.25  # m per radian: cost of rotating an example, since a body with another heading throws differently
+_LATE = 0.5  # m: cost of a frame at the end of its example as the beginning of a movement
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a motion is generated.
+    """Options of generating a motion.
 
-    pose_iterations, tolerance: the start pose is predicted again until hands and feet are within `tolerance` metres of
-    where they are to be, or so many times (§7.7.1: 75, 0.01). ik: limbs are corrected in each frame, by `share` of
-    the way to where they are wanted (feet that are to stand, all of it), before the next is predicted (§7.7.3).
-    blend: networks see trajectories that begin where hands and feet are. limits: joints stay within the range of the
-    training data, and what networks are asked stays near it, so that no error feeds itself (§9.4)."""
+    Attributes:
+        pose_iterations: maximum number of predictions of the start pose (section 7.7.1: 75).
+        tolerance: m; the start pose is predicted again until hands and feet are this near to their targets (0.01).
+        ik: limbs are corrected in each frame before the next is predicted (section 7.7.3).
+        share: share of the distance to the target by which they are corrected; feet in contact with the ground are
+            corrected fully.
+        blend: networks receive trajectories that begin at the current positions of hands and feet.
+        limits: joints stay within the range of the training data, and network inputs near it, so that errors do not
+            accumulate (section 9.4).
+    """
 
     pose_iterations: int = 75
     tolerance: float = 0.01
@@ -52,17 +57,23 @@ class Options:
     def __post_init__(self):
         if not (self.pose_iterations >= 0 and self.tolerance >= 0.0 and 0.0 <= self.share <= 1.0):
             found = f"{self.pose_iterations} iterations, tolerance {self.tolerance:g} m, share {self.share:g}"
-            raise InputError("options", found, "none of them negative, a share of at most 1")
+            raise InputError("options", found, "values of 0 or more, a share of at most 1")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Generated:
     """A generated motion.
 
-    effectors, predicted: (T, 4, 3) m, where hands and feet are, and where the networks had them in that frame before
-    anything was corrected. wanted: (T, 4, 3) m. over: (T, J) radians by which joints would have been beyond their
-    limits. floating: (T, j, 3) m, the places that a single network says of the joints `Chains.joints`, else None.
-    iterations: of the start pose. seconds: what it took."""
+    Attributes:
+        motion: the motion.
+        effectors: (T, 4, 3) m, positions of hands and feet.
+        predicted: (T, 4, 3) m, positions predicted by the networks in that frame, before corrections.
+        requested: (T, 4, 3) m, targets.
+        over: (T, J) rad by which joints would have been beyond their limits.
+        floating: (T, j, 3) m, positions that a single network predicts for the joints `Chains.joints`, else None.
+        iterations: iterations of the start pose.
+        seconds: computing time.
+    """
 
     motion: Motion
     effectors: np.ndarray
@@ -75,12 +86,12 @@ class Generated:
 
     @property
     def deviation(self) -> np.ndarray:
-        """Metres (T, 4) between each effector and where it was to be (eq. 4.1)."""
+        """Metres (T, 4) between each effector and its target (eq. 4.1)."""
         return np.linalg.norm(self.effectors - self.wanted, axis=-1)
 
     @property
     def raw(self) -> np.ndarray:
-        """The same (T, 4) of what the networks said in each frame."""
+        """Metres (T, 4) between the networks' prediction of each effector and its target."""
         return np.linalg.norm(self.predicted - self.wanted, axis=-1)
 
     @property
@@ -92,11 +103,18 @@ class Generated:
 def generate(
     model: ThrowModel, description: Description, start: Pose | None = None, options: Options | None = None
 ) -> Generated:
-    """The motion (T frames, as the description has) of the model's skeleton that follows the description.
+    """Generate the motion that follows a description.
 
-    start: the state in the first frame, in the normalised frame; without it one of the examples' poses is taken and
-    predicted until it fits. InputError where the description's rate is not the model's, hands are not given that the
-    model has to be given, or its networks lose the body."""
+    Args:
+        model: the model; the motion has its skeleton.
+        description: the description, T frames.
+        start: state in the first frame, in the normalised frame; None to choose a pose of the examples and predict
+            it until it matches.
+        options: options, or None for the defaults.
+    Raises:
+        InputError: if the frame rate is not the model's, required hand rotations are missing, or the networks'
+            output is invalid.
+    """
     options = options or Options()
     _check(model, description)
     began = time.perf_counter()
@@ -111,7 +129,7 @@ def generate(
 
 
 class _Loop:
-    """What stays the same from frame to frame."""
+    """Values that stay the same from frame to frame."""
 
     def __init__(self, ready: Stepper, description: Description, options: Options):
         self.ready, self.options = ready, options
@@ -120,7 +138,7 @@ class _Loop:
         self.shares = _shares(description, options) if options.ik else None
 
     def step(self, pose: Pose, window: Windows, now: int, then: int) -> Step:
-        """Frame `then` out of the pose of frame `now`."""
+        """Predict frame `then` from the pose of frame `now`."""
         if self.options.blend:
             window = blended(window, pose.positions[self.ready.effectors] - self.wanted[now], self.fps)
         share = None if self.shares is None else self.shares[then]
@@ -129,7 +147,7 @@ class _Loop:
         return made
 
     def start(self, pose: Pose | None, window: Windows) -> tuple[Step, int]:
-        """The first frame (§7.7.1): the best of what the iterations came by, and how many there were."""
+        """Predict the first frame (section 7.7.1): the best result of the iterations, and their number."""
         if pose is None:
             velocities = (self.wanted[1] - self.wanted[0]) * self.fps
             pose = start_pose(self.ready.model, self.wanted[0], velocities, self.limb)
@@ -147,12 +165,13 @@ class _Loop:
         return best, count
 
     def _off(self, step: Step) -> float:
+        """Measure the largest distance (m) of an effector from its target in the first frame."""
         places = step.state.positions[self.ready.effectors]
         return float(np.sqrt(((places - self.wanted[0]) ** 2).sum(-1)).max())
 
 
 def _shares(description: Description, options: Options) -> np.ndarray:
-    """How much of the way to where it is wanted each effector is taken (T, 4): feet that are to stand, all of it."""
+    """Compute the share (T, 4) of the distance to its target that each effector moves: 1 for feet in contact."""
     places = description.effectors
     speed = np.linalg.norm(np.gradient(places, 1.0 / description.fps, axis=0), axis=-1)
     height = places[..., 2] - places[..., 2].min(axis=0)
@@ -162,7 +181,7 @@ def _shares(description: Description, options: Options) -> np.ndarray:
 
 
 def _windows(model: ThrowModel, description: Description) -> list[Windows]:
-    """The window of the frame before the first, then those of all frames; the first two have the same phase."""
+    """Build the window of the frame before the first, then those of all frames; the first two have the same phase."""
     before = description.effectors[:1] if description.before is None else description.before[-1:]
     longer = replace(
         description, effectors=np.concatenate([before, description.effectors]),
@@ -176,21 +195,23 @@ def _windows(model: ThrowModel, description: Description) -> list[Windows]:
 
 
 def _check(model: ThrowModel, description: Description) -> None:
+    """Raise InputError if frame rate or hand rotations do not match the model."""
     if abs(description.fps - model.settings.fps) > 1e-6:
         found = f"{description.fps:g} frames per second"
-        raise InputError("description", found, f"the model's {model.settings.fps:g}", "sample it at that rate")
+        raise InputError("description", found, f"the model's {model.settings.fps:g}", "resample it to that rate")
     if description.hands is None and model.settings.kind == "hierarchy" and model.settings.wrist == "given":
-        raise InputError("description", "no rotations of the hands", "them, as the model was trained with them")
+        raise InputError("description", "no hand rotations", "hand rotations, which the model was trained with")
 
 
 def _check_numbers(step: Step, frame: int) -> None:
-    """InputError where networks answered what is no number, as they may where all is far from what they know."""
+    """Raise InputError if the body is invalid: networks may return NaN or huge values far from their training data."""
     if not (np.isfinite(step.pose.positions).all() and np.abs(step.pose.positions).max() < _FARTHEST):
-        raise InputError("model", f"networks that lose the body in frame {frame}", "a body near its description",
-                         "ask for what its examples are like, or train it longer")  # fmt: skip
+        raise InputError("model", f"an invalid body in frame {frame}", "a body near its description",
+                         "choose a target like those of the examples, or train the model longer")  # fmt: skip
 
 
 def _generated(model, description: Description, steps: list[Step], iterations: int, seconds: float) -> Generated:
+    """Build the result from the predicted frames."""
     root = np.stack([step.pose.root for step in steps])
     local = np.stack([step.pose.local for step in steps])
     effectors = list(stepper(model).effectors)
@@ -206,8 +227,16 @@ def _generated(model, description: Description, steps: list[Step], iterations: i
 
 @dataclass(frozen=True, eq=False)
 class Stock:
-    """Every frame of the examples. places (N, 4, 3) m and velocities (N, 4, 3) m/s of the effectors in the normalised
-    frame; limb (N,); example, frame (N,) indices; late (N,) 0 at the beginning of its example, 1 at its end."""
+    """All frames of the examples.
+
+    Attributes:
+        places: (N, 4, 3) m, positions of the effectors in the normalised frame.
+        velocities: (N, 4, 3) m/s of the effectors.
+        limb: (N,) limb of the example.
+        example: (N,) index of the example.
+        frame: (N,) index of the frame in its example.
+        progress: (N,) progress, 0 at the beginning of the example, 1 at its end.
+    """
 
     places: np.ndarray
     velocities: np.ndarray
@@ -219,9 +248,13 @@ class Stock:
 
 @lru_cache(maxsize=8)
 def stock(model: ThrowModel) -> Stock:
-    """All frames of a model's examples; kept, as models are asked again and again. InputError where it has none."""
+    """Collect all frames of a model's examples; cached, since models are evaluated repeatedly.
+
+    Raises:
+        InputError: if the model has no examples.
+    """
     if not model.examples:
-        raise InputError("model: examples", "none", "one at least, to begin with", "train the model again")
+        raise InputError("model: examples", "none", "at least one, for the start pose", "train the model again")
     effectors = list(chains_of(model.skeleton).effectors)
     rows = []
     for index, example in enumerate(model.examples):
@@ -234,13 +267,22 @@ def stock(model: ThrowModel) -> Stock:
 
 
 def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> tuple[int, int, float]:
-    """Example, frame and turn (radians about the upright) that fit effectors at places (4, 3) m, moving at velocities
-    (4, 3) m/s, best; frames of the same limb before all others.
+    """Find the frame of the examples that best fits effectors; frames of the same limb are preferred to all others.
 
-    A candidate may be moved over the ground and turned; heights have to fit."""
+    A candidate may be moved over the ground and rotated about the vertical; its heights have to match.
+
+    Args:
+        model: the model.
+        places: (4, 3) m, positions of the effectors.
+        velocities: (4, 3) m/s of the effectors.
+        limb: index into `EFFECTORS`.
+    Returns:
+        Index of the example, its frame, and the rotation about the vertical, rad.
+    """
     among = stock(model)
     mine = places[:, :2] - places[:, :2].mean(axis=0)
     theirs = among.places[..., :2] - among.places[..., :2].mean(axis=1, keepdims=True)
+    # best rotation of each candidate about the vertical through the middle of the effectors (2D Procrustes)
     turn = np.arctan2(
         (theirs[..., 0] * mine[:, 1] - theirs[..., 1] * mine[:, 0]).sum(-1), (theirs * mine).sum((-1, -2))
     )
@@ -256,8 +298,10 @@ def nearest(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb:
 
 
 def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.ndarray) -> Pose:
-    """The pose of an example's frame, turned by `turn` radians and moved over the ground so that its effectors lie
-    about places (4, 3) m; its joints move as they do there."""
+    """Place the pose of an example's frame so that its effectors lie about `places` (4, 3) m.
+
+    It is rotated by `turn` rad about the vertical; its joints have the velocities of the example.
+    """
     motion = model.examples[example].motion
     both = slice(max(frame - 1, 0), frame + 1)
     local = matrices(motion.frames(both.start, both.stop))
@@ -272,5 +316,8 @@ def placed(model: ThrowModel, example: int, frame: int, turn: float, places: np.
 
 
 def start_pose(model: ThrowModel, places: np.ndarray, velocities: np.ndarray, limb: int) -> Pose:
-    """The examples' pose that begins a movement best, placed; arguments as of `nearest`."""
+    """Choose and place the pose of the examples that best begins a movement.
+
+    Arguments as of `find_nearest_frame`.
+    """
     return placed(model, *nearest(model, places, velocities, limb), places)

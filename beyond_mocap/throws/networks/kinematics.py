@@ -1,8 +1,8 @@
-"""Bodies as rotation matrices, in numpy and in jax alike: places and turns of joints, and rotations as six numbers.
+"""Bodies as rotation matrices, in numpy and in jax: positions and rotations of joints, and rotations as six numbers.
 
-Networks learn on matrices: a rotation is the two first columns of its matrix (its x and its y axis; Zhang, Starke,
-Komura and Saito 2018, Fredriksson §7.1.1), which has no jumps. Every function takes the array module `xp` (numpy or
-jax.numpy) last, and writes into no array, so that training and use run the same code.
+Networks learn on matrices: a rotation is the first two columns of its matrix (its x and its y axis; Zhang, Starke,
+Komura and Saito 2018, Fredriksson section 7.1.1), which has no discontinuities. Every function takes the array
+module `xp` (numpy or jax.numpy) last, and writes into no array, so that training and use run the same code.
 """
 
 from __future__ import annotations
@@ -16,15 +16,20 @@ from ...motion import quaternion
 from ...motion.motion import Motion
 from ...motion.skeleton import Skeleton
 
-_TINY = 1e-12  # below any square of a length that matters: gradients of a root stay finite
+_TINY = 1e-12  # below any relevant square of a length: gradients of a square root stay finite
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 
 
 class Pose(NamedTuple):
-    """A body's state in one frame, or in many: leading axes are free.
+    """State of a body in one frame, or in many: leading axes are free.
 
-    root (..., 3) m, the root joint's place. local (..., J, 3, 3), each joint against its parent. positions (..., J, 3)
-    m and turns (..., J, 3, 3), in the world. moved (..., J, 3) m, how far each joint came since the frame before."""
+    Attributes:
+        root: (..., 3) m, position of the root joint, world.
+        local: (..., J, 3, 3), rotation of each joint relative to its parent.
+        positions: (..., J, 3) m, world.
+        turns: (..., J, 3, 3), rotations, world.
+        moved: (..., J, 3) m, displacement of each joint since the previous frame.
+    """
 
     root: np.ndarray
     local: np.ndarray
@@ -34,9 +39,17 @@ class Pose(NamedTuple):
 
 
 def places_and_turns(offsets, parents, root, local, xp=np):
-    """Forward kinematics: positions (..., J, 3) m and turns (..., J, 3, 3) in the world.
+    """Compute positions and rotations of all joints in the world (forward kinematics).
 
-    offsets (J, 3) m, parents (J,) with -1 for the root, which comes first; root (..., 3) m; local (..., J, 3, 3)."""
+    Args:
+        offsets: (J, 3) m, relative to the parents.
+        parents: (J,) with -1 for the root, which comes first.
+        root: (..., 3) m, world.
+        local: (..., J, 3, 3), relative to the parents.
+        xp: numpy or jax.numpy.
+    Returns:
+        Positions (..., J, 3) m and rotations (..., J, 3, 3).
+    """
     positions, turns = [root], [local[..., 0, :, :]]
     for joint in range(1, len(parents)):
         parent = parents[joint]
@@ -46,8 +59,10 @@ def places_and_turns(offsets, parents, root, local, xp=np):
 
 
 def one_pose(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray, np.ndarray]:
-    """The same for one pose with numpy: root (3,), local (J, 3, 3). All joints of one depth at once, turn and place as
-    one 4 x 4 matrix; several times as fast."""
+    """Compute the same for one pose with numpy, several times as fast: root (3,), local (J, 3, 3).
+
+    All joints of one depth are computed at once, rotation and position as one 4 x 4 matrix.
+    """
     moves = np.zeros((len(parents), 4, 4))
     moves[:, :3, :3], moves[:, :3, 3], moves[:, 3, 3] = local, offsets, 1.0
     moves[0, :3, 3] = root
@@ -58,7 +73,7 @@ def one_pose(offsets, parents: tuple[int, ...], root, local) -> tuple[np.ndarray
 
 @lru_cache(maxsize=32)
 def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Joints of each depth below the root, and their parents."""
+    """Group the joints by depth below the root, with their parents."""
     depths = []
     for parent in parents:
         depths.append(0 if parent < 0 else depths[parent] + 1)
@@ -68,18 +83,18 @@ def _levels(parents: tuple[int, ...]) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def pose_of(skeleton: Skeleton, root, local, xp=np) -> Pose:
-    """The state of a body, from its root's place (..., 3) m and local rotations (..., J, 3, 3), at rest."""
+    """Build the state of a body without motion from its root (..., 3) m and local rotations (..., J, 3, 3)."""
     positions, turns = places_and_turns(skeleton.offsets, skeleton.parents, root, local, xp)
     return Pose(root, local, positions, turns, xp.zeros_like(positions))
 
 
 def six(turns, xp=np):
-    """Rotations (..., 3, 3) as their x and y axis: (..., 6)."""
+    """Convert rotations (..., 3, 3) to their x and y axes: (..., 6)."""
     return xp.concatenate([turns[..., :, 0], turns[..., :, 1]], axis=-1)
 
 
 def from_six(values, xp=np):
-    """The rotations (..., 3, 3) nearest to values (..., 6): Gram-Schmidt, the x axis first."""
+    """Convert values (..., 6) to the nearest rotations (..., 3, 3): Gram-Schmidt, the x axis first."""
     first = _unit(values[..., :3], xp)
     second = values[..., 3:]
     second = _unit(second - xp.sum(first * second, axis=-1, keepdims=True) * first, xp)
@@ -92,27 +107,27 @@ def _unit(vectors, xp):
 
 
 def transposed(turns, xp=np):
-    """The inverse rotations (..., 3, 3)."""
+    """Invert rotations (..., 3, 3)."""
     return xp.swapaxes(turns, -1, -2)
 
 
 def matrices(motion: Motion) -> np.ndarray:
-    """A motion's local rotations as matrices (T, J, 3, 3)."""
+    """Convert a motion's local rotations to matrices (T, J, 3, 3)."""
     return quaternion.to_matrix(motion.rotations)
 
 
 def motion_of(skeleton: Skeleton, root: np.ndarray, local: np.ndarray, fps: float) -> Motion:
-    """The motion with these root positions (T, 3) m and local rotations (T, J, 3, 3)."""
+    """Build the motion with root positions (T, 3) m and local rotations (T, J, 3, 3)."""
     return Motion(skeleton, root, quaternion.from_matrix(np.asarray(local, dtype=float)), fps)
 
 
 def flat(values, axes: int):
-    """The last `axes` axes as one."""
+    """Merge the last `axes` axes into one."""
     return values.reshape(*values.shape[:-axes], -1)
 
 
 def picked(values, joints: tuple[int, ...], axis: int, xp=np):
-    """Some joints of values whose joints lie along `axis` (-2 for places, -3 for rotations)."""
+    """Take some joints of values whose joints lie along `axis` (-2 for positions, -3 for rotations)."""
     return xp.take(values, _index(joints), axis=axis)
 
 
@@ -122,10 +137,17 @@ def _index(joints: tuple[int, ...]) -> np.ndarray:
 
 
 def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local: dict, given: dict, xp=np) -> Pose:
-    """A pose with other rotations of some `joints`, and all `joints` where these bring them; the rest as it was.
+    """Update some joints of a pose with new rotations; all other joints stay as they are.
 
-    joints: indices, parents first. root: (..., 3) m, the root joint's place. local: joint -> (..., 3, 3), against its
-    parent. given: joint -> (..., 3, 3), in the world."""
+    Args:
+        skeleton: the skeleton.
+        pose: the pose.
+        joints: indices of the joints to update, parents first.
+        root: (..., 3) m, position of the root joint.
+        local: joint -> (..., 3, 3), relative to its parent.
+        given: joint -> (..., 3, 3), world.
+        xp: numpy or jax.numpy.
+    """
     places, turns, changed = {}, {}, dict(local)
     for joint in joints:
         parent = skeleton.parents[joint]
@@ -146,7 +168,7 @@ def spread(skeleton: Skeleton, pose: Pose, joints: tuple[int, ...], root, local:
 
 
 def _put(values, new: dict, axis: int, xp):
-    """Values with those of some joints replaced, in a new array."""
+    """Replace the values of some joints, in a new array."""
     if xp is np:
         changed = values.copy()
         for joint, value in new.items():

@@ -1,10 +1,10 @@
-"""Hands and feet brought towards where they are wanted, on a pose whose limbs the networks have spoken of: one limb
-at a time with numpy or jax, as the layer that networks are trained with (§9.4), and all four at once for use.
+"""Move hands and feet towards their targets in a pose that the networks predicted.
 
-By two-bone inverse kinematics: the knee or elbow bends or stretches until the limb has the length that is asked for,
-then the whole limb turns to the target by the shortest arc (Fredriksson §3.3.1, §7.7.3). `motion.limb` does the same
-over all frames of a finished motion; here one frame follows another, nothing may look ahead, and every step must have a
-derivative.
+Two-bone inverse kinematics: the knee or elbow bends or stretches until the limb has the required length, then the
+whole limb rotates to the target by the shortest arc (Fredriksson sections 3.3.1 and 7.7.3). One limb at a time with
+numpy or jax, as the layer that networks are trained with (section 9.4), and all four at once for use. `motion.limb`
+does the same over all frames of a finished motion; here one frame follows another, nothing may look ahead, and every
+step needs a derivative.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from .chains import LIMB_OF, Chains
 from .kinematics import Pose, one_pose, spread, transposed
 from .limits import JointLimits
 
-_STRETCH = 0.995  # share of a limb's length beyond which the body goes along
-_MOST = 0.05  # metres that it goes in one frame
-_ROUNDS = 4  # of moving the body towards what limbs do not reach
+_STRETCH = 0.995  # share of a limb's length beyond which the body moves too
+_MOST = 0.05  # metres that the body moves in one frame at most
+_ROUNDS = 4  # iterations of moving the body towards targets out of reach
 _ONES = np.ones((3, 1))
 _CROSS = np.zeros((9, 3))  # the nine products of two vectors' components -> their cross product
 _CROSS[[5, 6, 1], [0, 1, 2]], _CROSS[[7, 2, 3], [0, 1, 2]] = 1.0, -1.0
 _SKEW = np.zeros((3, 9))  # a vector -> the matrix of the cross product with it
 _SKEW[[0, 1, 2], [7, 2, 3]], _SKEW[[0, 1, 2], [5, 6, 1]] = 1.0, -1.0
 _EYE = np.eye(3)
-_STRAIGHT = 0.03  # weight of the given hinge against the sine of the bend that the limb shows itself
-_TINY = 1e-12  # m^2: roots keep a finite derivative at zero
+_STRAIGHT = 0.03  # weight of the given hinge axis against the sine of the limb's own bend
+_TINY = 1e-12  # m^2: square roots keep a finite derivative at zero
 
 
 def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
-    """Unit axes (4, 3) about which elbows and knees bend, in the axes of the middle joint's parent.
+    """Find the unit axes (4, 3) about which elbows and knees bend, in the axes of the middle joint's parent.
 
-    From the limits; where they show none (or are None) the line from hip to hip of the rest pose."""
+    They come from the limits; where those show none (or are None), from the line between the hips of the rest pose.
+    """
     known = {hinge.joint: hinge.across for hinge in (limits.hinges if limits is not None else ())}
     offsets = chains.skeleton.offsets
     across = offsets[chains.sockets[2]] - offsets[chains.sockets[3]]
@@ -43,11 +44,21 @@ def hinge_axes(chains: Chains, limits: JointLimits | None) -> np.ndarray:
 
 
 def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.ndarray, turn_kept: bool, xp) -> Pose:
-    """`after` with limb `number` of `EFFECTORS` brought towards `wanted` (..., 3) m by `share` of the way.
+    """Move one limb towards its target.
 
-    axes: of `hinge_axes`. turn_kept: hand or foot keeps its turn in the world (a given hand; every foot, so that the
-    toe comes to its place); else it rides on the lower bone. All joints of the limb are right afterwards, in numpy
-    and in jax."""
+    Args:
+        number: index of the limb in `EFFECTORS`.
+        chains: chains of the skeleton.
+        after: the pose to change.
+        requested: (..., 3) m, target of the limb's end, world.
+        share: share of the distance to the target that the limb's end moves.
+        axes: (4, 3), from `find_hinge_axes`.
+        keeps_rotation: hand or foot keeps its world rotation (a given hand; every foot, so that the toe reaches its
+            target); otherwise it moves with the lower bone.
+        xp: numpy or jax.numpy.
+    Returns:
+        The pose; all joints of the limb are valid, in numpy and in jax.
+    """
     upper, middle, end, effector = _joints(chains, number)
     places, turns, parents = after.positions, after.turns, chains.skeleton.parents
     tip = places[..., effector, :]
@@ -64,7 +75,7 @@ def bent_limb(number: int, chains: Chains, after: Pose, wanted, share, axes: np.
 
 
 class LimbReach:
-    """All four limbs of one pose at once: the same as `bent_limb` for each, several times as fast."""
+    """Move all four limbs of one pose at once: same result as `reach_limb` for each, several times as fast."""
 
     def __init__(self, chains: Chains, limits: JointLimits | None, hands_given: bool):
         self.chains = chains
@@ -82,8 +93,13 @@ class LimbReach:
         self._kept = [0, 1, 2, 3] if hands_given else [2, 3]
 
     def __call__(self, pose: Pose, wanted: np.ndarray, share: np.ndarray) -> Pose:
-        """The pose with its effectors brought towards wanted (4, 3) m by their shares (4,) of the way; root and trunk
-        keep their turns."""
+        """Move the effectors of a pose towards their targets; root and trunk keep their rotations.
+
+        Args:
+            pose: the pose.
+            requested: (4, 3) m, targets, world.
+            share: (4,) share of the distance that each effector moves.
+        """
         places, turns = pose.positions, pose.turns
         tip, end = places[self._tip], places[self._end]
         target = toward(tip, wanted, share[:, None]) - (tip - end)
@@ -92,13 +108,12 @@ class LimbReach:
         return posed(self.chains, root, self._bent(pose.local, places, turns, end, target))
 
     def all_the_way(self, pose: Pose, wanted: np.ndarray) -> np.ndarray:
-        """Local rotations (J, 3, 3) of the pose with its effectors brought to wanted (4, 3) m, as near as limbs
-        reach."""
+        """Compute local rotations (J, 3, 3) that bring the effectors as near to `requested` (4, 3) m as possible."""
         tip, end = pose.positions[self._tip], pose.positions[self._end]
         return self._bent(pose.local, pose.positions, pose.turns, end, wanted - (tip - end))
 
     def _bent(self, local, places, turns, end, target) -> np.ndarray:
-        """Local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
+        """Compute local rotations that bring the limbs' ends from `end` (4, 3) m to `target` (4, 3) m."""
         hinge = (turns[self._above_middle] @ self._axes[:, :, None])[..., 0]
         first, second, _ = bend_to(places[self._upper], places[self._middle], end, target=target, hinge=hinge, xp=np)
         local = local.copy()
@@ -110,7 +125,7 @@ class LimbReach:
         return local
 
     def _way_down(self, high: list[int], low: list[int]) -> np.ndarray:
-        """Lengths (4,) m of bones from joints down to others, joints between them at rest."""
+        """Measure the distances (4,) m from joints down to others, joints between them at rest."""
         ways = []
         for top, joint in zip(high, low):
             way = np.zeros(3)
@@ -120,8 +135,13 @@ class LimbReach:
         return np.array(ways)
 
     def _give(self, top: np.ndarray, end: np.ndarray, target: np.ndarray) -> np.ndarray:
-        """How far (3,) m the whole body goes towards targets (4, 3) m that lie out of the limbs' reach; top, end (4, 3)
-        m of the limbs, which reach as far as they already do at least."""
+        """Compute the displacement (3,) m of the whole body towards targets out of the limbs' reach.
+
+        Args:
+            top: (4, 3) m, first joints of the limbs.
+            end: (4, 3) m, ends of the limbs; limbs reach at least as far as they already do.
+            target: (4, 3) m.
+        """
         given, now = np.zeros(3), end - top
         reach = np.maximum(_STRETCH * self._lengths, np.sqrt((now * now).sum(-1)))
         for _ in range(_ROUNDS):
@@ -135,19 +155,19 @@ class LimbReach:
 
 
 def posed(chains: Chains, root: np.ndarray, local: np.ndarray) -> Pose:
-    """The pose with these local rotations (J, 3, 3); how far its joints moved is not known (zero)."""
+    """Build a pose from local rotations (J, 3, 3) and a root at (3,) m; its joint displacements are zero."""
     places, turns = one_pose(chains.skeleton.offsets, chains.skeleton.parents, root, local)
     return Pose(root, local, places, turns, np.zeros_like(places))
 
 
 def _joints(chains: Chains, number: int) -> tuple[int, int, int, int]:
-    """Upper, middle and end joint and effector of a limb; a foot ends its leg, its toe is the effector."""
+    """List upper, middle and end joint and effector of a limb; a foot ends its leg, its toe is the effector."""
     end = chains.effectors[number] if number < 2 else chains.ankles[number - 2]
     return chains.sockets[number], chains.middles[number], end, chains.effectors[number]
 
 
 def _between(chains: Chains, high: int, low: int) -> list[int]:
-    """Joints from `high` (included) down to `low` (not included)."""
+    """List the joints from `high` (included) down to `low` (not included)."""
     joint, found = chains.skeleton.parents[low], []
     while joint != high:
         found.append(joint)
@@ -156,21 +176,33 @@ def _between(chains: Chains, high: int, low: int) -> list[int]:
 
 
 def toward(predicted, wanted, share):
-    """The point that is reached for, (..., 3) m: between what was predicted and what is wanted (..., 3), at `share` of
-    the way (§7.7.3: a linearly interpolated point, so that joints are not over-corrected)."""
+    """Interpolate the point (..., 3) m to reach, at `share` from the predicted to the requested point.
+
+    A linearly interpolated point avoids over-correction of the joints.
+    Source: Fredriksson section 7.7.3.
+    """
     return predicted + share * (wanted - predicted)
 
 
 def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
-    """World turns that bring a limb's end joint to `target`.
+    """Solve the world rotations that bring a limb's end joint to a target.
 
-    top, middle, end, target: (..., 3) metres, world. hinge: (..., 3) unit, world, about which the middle joint bends
-    (upper bone x lower bone of a bent limb); it only counts where the limb is nearly straight. xp: numpy or jax.numpy.
-    soft: metres below full length from where the limb eases (`motion.limb.soft_distance`).
+    Bones keep their lengths; a target out of reach is approached along its line, one too close to `top` is kept at
+    the difference of the bone lengths.
 
-    Returns turn_upper, turn_lower (..., 3, 3), to be put left of the bones' world rotations, and the end joint's new
-    place (..., 3). Bones keep their lengths; a target out of reach is neared along its line, one too close to `top` is
-    kept away by the difference of the bones."""
+    Args:
+        top: (..., 3) m, first joint, world; `middle`, `end` and `target` alike.
+        middle: (..., 3) m, elbow or knee.
+        end: (..., 3) m, end joint.
+        target: (..., 3) m, where the end joint has to be.
+        hinge: (..., 3) unit, world, bending axis of the middle joint (upper bone x lower bone of a bent limb); it
+            only counts where the limb is nearly straight.
+        xp: numpy or jax.numpy.
+        soft: metres below full length at which the limb begins to ease (`motion.limb.soft_distance`).
+    Returns:
+        Rotations of the upper and the lower bone (..., 3, 3), to multiply from the left to the bones' world
+        rotations, and the end joint's new position (..., 3) m.
+    """
     upper, lower = middle - top, end - middle
     long_upper, long_lower = _length(upper, xp), _length(lower, xp)
     along, down = upper / long_upper, lower / long_lower
@@ -178,24 +210,24 @@ def bend_to(top, middle, end, target, hinge, xp, soft: float = 0.01):
     axis = _unit(axis - _dot(axis, along) * along, xp)
     way = target - top
     asked = _length(way, xp)
-    # a limb that is already as straight as that stays so
+    # the limb does not shorten where it is already straighter than the eased reach
     reach = xp.maximum(_eased(asked, long_upper, long_lower, soft, xp), xp.minimum(asked, _length(end - top, xp)))
     cosine = (reach * reach - long_upper * long_upper - long_lower * long_lower) / (2.0 * long_upper * long_lower)
     cosine = xp.clip(cosine, -1.0, 1.0)
-    # held off zero after the square: in float32 no number between 1 - 1e-9 and 1 keeps the root's derivative finite
+    # limited after squaring: in float32 no number between 1 - 1e-9 and 1 keeps the derivative of the root finite
     bent = cosine * along + xp.sqrt(xp.maximum(1.0 - cosine * cosine, 2e-9)) * _cross(axis, along)
     swing = _shortest(_unit(long_upper * along + long_lower * bent, xp), way / asked)
     return swing, swing @ _shortest(down, bent), top + way * (reach / asked)
 
 
 def _eased(asked, upper, lower, soft, xp):
-    """The reach that is played for an asked one, metres."""
+    """Compute the eased reach for a requested one, metres."""
     longest = upper + lower
     return xp.maximum(soft_distance(asked, longest, soft, xp), xp.abs(upper - lower) + 0.02 * longest)
 
 
 def _shortest(one, other):
-    """Rotations (..., 3, 3) that turn unit `one` (..., 3) to unit `other` by the shortest arc."""
+    """Compute rotations (..., 3, 3) from unit vectors `one` (..., 3) to unit vectors `other` by the shortest arc."""
     cosine = _dot(one, other)[..., None]
     axis = _cross(one, other)
     skew = (axis @ _SKEW).reshape(*axis.shape[:-1], 3, 3)
@@ -203,6 +235,7 @@ def _shortest(one, other):
 
 
 def _cross(a, b):
+    """Compute the cross product of (..., 3) vectors as one matrix product."""
     products = a[..., :, None] * b[..., None, :]
     return products.reshape(*products.shape[:-2], 9) @ _CROSS
 

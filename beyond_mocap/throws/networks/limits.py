@@ -1,17 +1,17 @@
-"""How far joints turn: the range that the training data show, and hinges that do not bend backwards.
+"""Joint limits from the range of the training data, with hinges that do not bend backwards.
 
-A joint's range is kept about the mean of its rotations in the training data: the offset from that mean is a rotation
-vector, and each of its three components stays between the lowest and highest that was seen, widened by a margin. About
-the mean the vectors are short, also where a rig's rest pose lies far from how the joint is used, so the box has no
-seam. A network that is asked for what it has never seen can leave the range (Fredriksson §9.4: "extreme angular
-velocities"); `within` brings it back.
+The range of a joint is stored about the mean of its rotations in the training data: the offset from that mean is a
+rotation vector, and each of its three components stays between the lowest and highest value in the data, widened by
+a margin. About the mean the vectors are short, also where a rig's rest pose is far from how the joint is used, so
+the range has no discontinuity. A network that receives inputs unlike its training data can leave the range
+(Fredriksson section 9.4: "extreme angular velocities"); `JointLimits.limit_rotations` brings the joints back.
 
-`LimbLimits` are those of a model's limb on other bones: of any rig that its motions are brought to, and of the mirror
-image. Retargeting and mirroring carry whole segments over, so that a joint of the other body has, up to a fixed turn
-(with a reflection, where mirrored) of its axes, the world rotation of the model's: W' = M W B. The turns B are read off
-a motion that stands on both bodies, as the nearest orthogonal matrices to the mean of W^T M W'; then a joint with
-parent p is judged as the model's would be that has the local rotation B_p L' B^T. What inverse kinematics of legs and a
-collar bone that is missing change is left over: the mean takes no part of it, so it counts as bent.
+`LimbLimits` apply the limits of a model's limb to other bones: to any rig that its motions are retargeted to, and to
+the mirror image. Retargeting and mirroring transfer whole segments, so a joint of the other body has, up to a fixed
+rotation of its axes (with a reflection, where mirrored), the world rotation of the model's: W' = M W B. The
+rotations B are estimated from a motion that is present on both bodies, as the nearest orthogonal matrices to the
+mean of W^T M W'; a joint with parent p is then checked as the model's joint with the local rotation B_p L' B^T. What
+inverse kinematics of the legs and a missing collar bone change is not part of the mean, so it counts as bending.
 
 As an array of a model: (J, 3, 3), rows middle (rotation vector, rad), lowest and highest offset (rad) of each joint.
 """
@@ -33,35 +33,42 @@ from ...motion.skeleton import Skeleton, frozen_array
 from .kinematics import transposed
 
 FREE = 4.0
-"""Radians: offsets never get so long, so a joint with this range is free."""
-_MARGIN = np.radians(10.0)  # beyond what the data show, on either side
-_SHARE = 0.08  # of the range, on either side
-_ROUNDS = 8  # steps to a mean rotation and to the middle of a range
-_CLEAR = np.radians(6.0)  # a hinge whose mean bend is less does not show which way it bends
-_BACK = np.radians(5.0)  # so far elbows and knees may bend backwards: people's do, and joint centres are not exact
-_OFF = 1e-9  # radians
-_TURNS = 6  # of box and hinges, until both are kept
-_LONG = 2.0  # radians: longer offsets may as well be meant the other way round
-_TINY = 1e-12  # metres: what is shorter has no direction
+"""Half-range in radians of a joint without limits: offsets are never that long."""
+_MARGIN = np.radians(10.0)  # added to the range of the data on either side
+_SHARE = 0.08  # share of the range, added on either side
+_ROUNDS = 8  # iterations of the mean rotation and of the middle of a range
+_CLEAR = np.radians(6.0)  # below this mean bend the direction in which a hinge bends is unknown
+_BACK = np.radians(5.0)  # allowed backward bend of elbows and knees: people have it, and joint centres are not exact
+_OFF = 1e-9  # radians: smaller excess is ignored
+_TURNS = 6  # alternations between ranges and hinges, until both are satisfied
+_LONG = 2.0  # radians: above this the other sign of the rotation vector is considered too
+_TINY = 1e-12  # metres: shorter vectors have no direction
 _ONES = np.ones(3)
-_PARTS = np.zeros((9, 4))  # a matrix's nine numbers -> its skew part as a vector, and its trace
+_PARTS = np.zeros((9, 4))  # the nine elements of a matrix -> its skew part as a vector, and its trace
 _PARTS[[7, 2, 3], [0, 1, 2]], _PARTS[[5, 6, 1], [0, 1, 2]], _PARTS[[0, 4, 8], 3] = 1.0, -1.0, 1.0
 
 _MIRROR = np.diag([1.0, -1.0, 1.0])
-_FRAMES = 24  # of a motion that tell how axes lie
+_FRAMES = 24  # frames of a motion from which the joint axes are estimated
 
 
 def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
-    """Limits (J, 3, 3) of the joints whose local rotations (N, J, 4) are given; joints in `free` get none.
+    """Estimate joint limits from local rotations.
 
-    The ends are what the data show, widened by 10 degrees and 8 % of the range: a few people do not show all that a
-    joint can do."""
+    The limits are the range of the data, widened by 10 degrees and 8 % of the range: a few people do not show
+    everything that a joint can do.
+
+    Args:
+        rotations: (N, J, 4) local rotations, unit quaternions.
+        free_joints: indices of joints without limits.
+    Returns:
+        (J, 3, 3) rad: middle as a rotation vector, lowest and highest offset from it.
+    """
     q = np.asarray(rotations, dtype=float)
     middle = _mean(q)
     for _ in range(_ROUNDS):
         offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
         low, high = offsets.min(axis=0), offsets.max(axis=0)
-        # from the middle of the range vectors stay far from half a turn, where they jump
+        # measured from the middle of the range, vectors stay far from pi, where their sign flips
         middle = quaternion.multiply(middle, quaternion.from_rotation_vector(0.5 * (low + high)))
     offsets = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q))
     low, high = offsets.min(axis=0), offsets.max(axis=0)
@@ -72,7 +79,7 @@ def learn(rotations: np.ndarray, free: tuple[int, ...] = (0,)) -> np.ndarray:
 
 
 def _mean(q: np.ndarray) -> np.ndarray:
-    """The mean rotation (J, 4) of unit quaternions (N, J, 4), by steps along the mean offset (the Karcher mean)."""
+    """Compute the mean rotation (J, 4) of unit quaternions (N, J, 4), by steps along the mean offset (Karcher mean)."""
     middle = quaternion.normalized(np.sum(np.where(np.sum(q * q[:1], axis=-1, keepdims=True) < 0, -q, q), axis=0))
     for _ in range(_ROUNDS):
         offset = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(middle), q)).mean(axis=0)
@@ -82,9 +89,15 @@ def _mean(q: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Hinge:
-    """Which way an elbow or knee bends. joint, end: the lower bone's joint and the one that ends it. across (3,): unit,
-    in the axes of the joint's parent, about which it bends; along (3,): the lower bone's direction there when straight;
-    bone (3,): the lower bone in the joint's own axes, metres."""
+    """Direction in which an elbow or knee bends.
+
+    Attributes:
+        joint: joint of the lower bone.
+        end: joint that ends the lower bone.
+        across: (3,) unit bending axis, in the axes of the joint's parent.
+        along: (3,) unit direction of the lower bone when straight, in the axes of the joint's parent.
+        bone: (3,) m, the lower bone in the joint's own axes.
+    """
 
     joint: int
     end: int
@@ -94,14 +107,21 @@ class Hinge:
 
 
 class JointLimits:
-    """Limits ready for use. limits: (J, 3, 3) as of `learn`. InputError for another shape, or no numbers."""
+    """Joint limits prepared for evaluation.
+
+    Args:
+        skeleton: skeleton of the joints.
+        limits: (J, 3, 3) rad, as from `estimate_joint_limits`.
+    Raises:
+        InputError: if the shape is wrong, a value is not finite, or a lowest angle is above the highest.
+    """
 
     def __init__(self, skeleton: Skeleton, limits: np.ndarray):
         limits = frozen_array(limits)
         if limits.shape != (len(skeleton), 3, 3) or not np.isfinite(limits).all():
             raise InputError("joint limits", f"an array {limits.shape}", f"finite numbers ({len(skeleton)}, 3, 3)")
         if np.any(limits[:, 1] > limits[:, 2]):
-            raise InputError("joint limits", "a lowest angle above the highest", "lowest, then highest")
+            raise InputError("joint limits", "a lowest angle above the highest", "the lowest angle first")
         self.skeleton = skeleton
         self.middle = quaternion.to_matrix(quaternion.from_rotation_vector(limits[:, 0]))
         self._back = np.ascontiguousarray(self.middle.swapaxes(-1, -2))
@@ -109,6 +129,7 @@ class JointLimits:
         self._hold(_hinges(skeleton, self.middle))
 
     def _hold(self, hinges: tuple[Hinge, ...]) -> None:
+        """Store hinges with their bones and bending planes as arrays."""
         self.hinges = hinges
         self._joints = np.array([hinge.joint for hinge in self.hinges], dtype=int)
         self._bones = np.array([hinge.bone for hinge in self.hinges]).reshape(-1, 3, 1)
@@ -116,7 +137,10 @@ class JointLimits:
         self._axes = np.array(axes).reshape(-1, 2, 3)
 
     def of_joints(self, joints: Sequence[int]) -> JointLimits:
-        """The limits of these joints alone, which are the only ones in what it is then asked of, in this order."""
+        """Return the limits of the given joints only.
+
+        Arrays passed to the result have just these joints, in this order.
+        """
         joints, part = list(joints), copy(self)
         part.middle, part._back, part.low, part.high = (
             values[joints] for values in (self.middle, self._back, self.low, self.high)
@@ -125,7 +149,7 @@ class JointLimits:
         return part
 
     def offsets(self, local: np.ndarray) -> np.ndarray:
-        """Rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
+        """Compute rotation vectors (..., J, 3) rad from the middle to local rotations (..., J, 3, 3)."""
         m = self._back @ local
         parts = m.reshape(*m.shape[:-2], 9) @ _PARTS  # twice the sine times the axis, and the trace
         sine = 0.5 * parts[..., :3]
@@ -136,14 +160,16 @@ class JointLimits:
         return self._other_way_round(offsets, angle) if angle.max() > _LONG else offsets
 
     def _other_way_round(self, offsets: np.ndarray, angle: np.ndarray) -> np.ndarray:
-        """The offsets (..., J, 3), long ones by the long way round where that is nearer to the range: over half a turn
-        the short way jumps to the other side."""
+        """Replace long offsets (..., J, 3) by their equivalent of opposite sign where that is nearer to the range.
+
+        Beyond half a revolution the short vector flips to the opposite side.
+        """
         long = offsets * (1.0 - 2.0 * np.pi / np.maximum(angle, _LONG))[..., None]
         over = [np.abs(way - np.clip(way, self.low, self.high)).max(-1) for way in (offsets, long)]
         return np.where(((angle > _LONG) & (over[1] < over[0]))[..., None], long, offsets)
 
     def beyond(self, local: np.ndarray) -> np.ndarray:
-        """How far local rotations (..., J, 3, 3) lie outside, (..., J) rad: out of the box, or bent backwards."""
+        """Measure the excess (..., J) rad of local rotations (..., J, 3, 3): outside the range, or bent backwards."""
         offsets = self.offsets(local)
         out = np.linalg.norm(offsets - np.clip(offsets, self.low, self.high), axis=-1)
         joints = [hinge.joint for hinge in self.hinges]
@@ -151,15 +177,21 @@ class JointLimits:
         return out
 
     def within(self, local: np.ndarray, given: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Local rotations (..., J, 3, 3) brought back, and how far they were outside (..., J) rad. given (..., J, 3,
-        3): rotations that are allowed, even where they lie outside."""
+        """Limit local rotations to their ranges.
+
+        Args:
+            local: (..., J, 3, 3) local rotations.
+            permitted: (..., J, 3, 3) rotations that are allowed, even outside the range, or None.
+        Returns:
+            The limited rotations, and by how much each joint was outside, (..., J) rad.
+        """
         low, high, most = self.low, self.high, _BACK
         if given is not None:
             allowed = self.offsets(given)
             low, high = np.minimum(low, allowed), np.maximum(high, allowed)
             most = np.maximum(most, -self.bends(given))
         over = np.zeros(())
-        for _ in range(_TURNS):  # a hinge that comes forward may leave the box, and the other way round
+        for _ in range(_TURNS):  # correcting a hinge may leave the range, and the reverse
             local, out = self._in_box(local, low, high)
             over, back = np.maximum(over, out), self._backwards(local, most)
             if not (back > _OFF).any():
@@ -168,6 +200,7 @@ class JointLimits:
         return local, over
 
     def _in_box(self, local, low, high) -> tuple[np.ndarray, np.ndarray]:
+        """Clip the offsets of joints to their ranges; also return the excess (..., J) rad."""
         offsets = self.offsets(local)
         kept = np.minimum(np.maximum(offsets, low), high)
         over = np.abs(offsets - kept).max(-1)
@@ -179,6 +212,7 @@ class JointLimits:
         return local, over
 
     def _forward(self, local, over, back) -> tuple[np.ndarray, np.ndarray]:
+        """Rotate hinges about their bending axes by the excess `back` (..., H) rad; also return the total excess."""
         local, over = local.copy(), over.copy()
         for number, hinge in enumerate(self.hinges):
             turn = quaternion.from_rotation_vector(back[..., number, None] * hinge.across)
@@ -187,18 +221,18 @@ class JointLimits:
         return local, over
 
     def bends(self, local: np.ndarray) -> np.ndarray:
-        """Bends (..., H) rad of `hinges` in local rotations (..., J, 3, 3): 0 straight, negative backwards."""
+        """Measure the bend (..., H) rad of each hinge in local rotations (..., J, 3, 3): negative is backwards."""
         bones = local[..., self._joints, :, :] @ self._bones
         shares = self._axes @ bones
         return arctan2(shares[..., 0, 0], shares[..., 1, 0])
 
     def _backwards(self, local: np.ndarray, most: float | np.ndarray = _BACK) -> np.ndarray:
-        """Radians (..., H) by which hinges bend further back than `most`."""
+        """Measure by how much (..., H) rad hinges bend further backwards than `most`."""
         return np.maximum(-most - self.bends(local), 0.0)
 
 
 def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
-    """Elbows and knees whose mean pose shows which way they bend. middle: (J, 3, 3) mean local rotations."""
+    """Find the elbows and knees whose mean pose, local rotations (J, 3, 3), shows in which direction they bend."""
     body = identify(skeleton)
     found = []
     for limb in (body.left, body.right):
@@ -210,7 +244,7 @@ def _hinges(skeleton: Skeleton, middle: np.ndarray) -> tuple[Hinge, ...]:
 
 
 def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hinge | None:
-    """None where other joints stand between the two bones or where the mean pose is straight."""
+    """Build a hinge; None if there are joints between the two bones, or if the mean pose is straight."""
     if skeleton.parents[end] != lower:
         return None
     along = unit_vector(skeleton.offsets[lower], least=_TINY)
@@ -222,8 +256,14 @@ def _hinge(skeleton: Skeleton, middle: np.ndarray, lower: int, end: int) -> Hing
 
 @dataclass(frozen=True, eq=False)
 class LimbLimits:
-    """Limits of one limb on a body. limits: of the model's limb alone. joints: the body's, as many. above, axes:
-    (C, 3, 3), from the axes of the joints' parents and of the joints to those of the model's."""
+    """Limits of one limb of a model, applied to a body.
+
+    Attributes:
+        limits: limits of the model's limb alone.
+        joints: C joint indices of the body's limb, as many as the model's.
+        parent_axes: (C, 3, 3), from the axes of the joints' parents to those of the model's.
+        axes: (C, 3, 3), from the axes of the joints to those of the model's.
+    """
 
     limits: JointLimits
     joints: tuple[int, ...]
@@ -235,8 +275,16 @@ class LimbLimits:
         cls, limits: JointLimits, own: Motion, own_joints: tuple[int, ...], shown: Motion, joints: tuple[int, ...],
         mirrored: bool = False,
     ) -> LimbLimits:
-        """The limits of a model's limb `own_joints` for the limb `joints` of `shown`, which shows `own`, a motion of
-        the model's skeleton, frame by frame, at the same place. mirrored: it shows its mirror image at y = 0."""
+        """Estimate the axes of a limb from one motion on two bodies, frame by frame at the same place.
+
+        Args:
+            limits: limits of the model.
+            own: a motion of the model's skeleton.
+            own_joints: the model's limb.
+            target_motion: the same motion on the body.
+            joints: the body's limb.
+            mirrored: the body has the mirror image at y = 0.
+        """
         frames = np.unique(np.linspace(0, len(own) - 1, _FRAMES).astype(int))
         poses = [(m.skeleton, m.root_positions[frames], m.rotations[frames]) for m in (own, shown)]
         turns = [quaternion.to_matrix(pose_kinematics(*pose)[1]) for pose in poses]
@@ -255,8 +303,10 @@ class LimbLimits:
         )
 
     def held(self, rotations: np.ndarray, given: np.ndarray) -> np.ndarray:
-        """Local rotations (W, C, 4) of the limb's joints brought within their limits; where `given` (W, C, 4) lies
-        beyond them, no further than that."""
+        """Limit local rotations (W, C, 4) of the limb's joints.
+
+        Where `permitted` (W, C, 4) exceeds the limits, it is the limit.
+        """
         local, over = self.limits.within(self._carried(rotations), self._carried(given))
         if not over.any():
             return rotations
@@ -264,9 +314,9 @@ class LimbLimits:
         return np.where(over[..., None] > 0.0, quaternion.signed_like(back, rotations), rotations)
 
     def beyond(self, motion: Motion) -> np.ndarray:
-        """(T, C) rad by which the limb's joints are beyond their limits."""
+        """Measure the excess (T, C) rad of the limb's joints beyond their limits."""
         return self.limits.beyond(self._carried(motion.rotations[:, list(self.joints)]))
 
     def _carried(self, rotations: np.ndarray) -> np.ndarray:
-        """(..., C, 3, 3): as the model's joints would be turned."""
+        """Convert rotations (..., C, 4) of the body's limb to matrices (..., C, 3, 3) of the model's joints."""
         return self.above @ quaternion.to_matrix(rotations) @ transposed(self.axes)

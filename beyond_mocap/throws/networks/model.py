@@ -1,5 +1,7 @@
-"""All that one file of weights holds: what was trained, on which skeleton, the networks, and the examples that a start
-pose is taken from (Fredriksson §7.7.1)."""
+"""Contents of one file of weights: settings, skeleton, networks, and the examples that start poses are taken from.
+
+Source: Fredriksson section 7.7.1.
+"""
 
 from __future__ import annotations
 
@@ -19,28 +21,36 @@ if TYPE_CHECKING:
     from .example import Example
 
 SINGLE = "single"
-"""The one network of the monolithic model (§7.2)."""
+"""The one network of the monolithic model (section 7.2)."""
 _CHOICES = {
     "kind": ("hierarchy", "single"), "wrist": ("given", "inferred"), "frame": ("hip", "static"),
     "phase": ("distance", "warped"), "action": ("throw", "kick"),
 }  # fmt: skip
 _RANGES = {"points": (1, 16), "layers": (1, 16), "units": (1, 4096)}
 SLOWEST, FASTEST = 10.0, 500.0
-"""Frames per second between which a model may be trained."""
+"""Range of frame rates, frames per second, at which a model may be trained."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ModelSettings:
-    """What kind of model it is.
+    """Settings of a model.
 
-    kind: hierarchy (six networks) or single (one). points: control points of the phase function; 1 is feed-forward.
-    layers, units: hidden layers of each network, and units in each. wrist: whether the hands' rotations are given in
-    the description or inferred. frame: positions from where the hips stand on the ground in each frame (hip), or from
-    where the example begins (static, §7.3's capture frame). phase: by travelled distance (§7.4.1) or warped in time
-    (§9.3). ik_layer: limbs were trained with their inverse kinematics inside the loss. conditioned: children were
-    trained on what their parents predict (§9.4). guided: the networks of limbs are told how inverse kinematics would
-    reach (`features.reached`). carried: the network of the hips is told where hands and feet would carry them
-    (`features.carry_hips`). fps: frames per second. action: throw or kick."""
+    Attributes:
+        kind: hierarchy (six networks) or single (one network).
+        points: control points of the phase function; 1 is a plain feed-forward network.
+        layers: hidden layers of each network.
+        units: units of each hidden layer.
+        wrist: given (the description contains the hands' rotations) or inferred (the networks predict them).
+        frame: origin of the positions: hip (below the hips in each frame) or static (where the example begins, the
+            capture frame of section 7.3).
+        phase: distance (by travelled distance, section 7.4.1) or warped (by time warping, section 9.3).
+        ik_layer: limbs were trained with inverse kinematics inside the loss.
+        conditioned: child networks were trained on the output of their parents (section 9.4).
+        guided: limb networks also receive the inverse-kinematics solution (`features.compute_reach_guide`).
+        carried: the hip network also receives the hips as hands and feet carry them (`features.carry_hips`).
+        fps: frames per second.
+        action: throw or kick.
+    """
 
     kind: str = "hierarchy"
     points: int = 4
@@ -72,7 +82,7 @@ class ModelSettings:
 
     @property
     def networks(self) -> tuple[str, ...]:
-        """Names of its networks, in the order in which they are evaluated."""
+        """Names of the networks, in order of evaluation."""
         return HIERARCHY if self.kind == "hierarchy" else (SINGLE,)
 
 
@@ -80,11 +90,19 @@ class ModelSettings:
 class ThrowModel:
     """A trained model of throws or kicks.
 
-    networks: by name, `settings.networks`. leg_reach: {"left": (shortest, longest), "right": ...}, metres from the top
-    of the leg to the toe in the training data (eq. 7.3). examples: recorded movements in the normalised frame, at the
-    model's rate, on its skeleton. stature: metres. joint_limits: (J, 3, 3) radians, as of `limits.learn` of the
-    training data, or None. reference: (N,) the limb's speed over evenly spaced phases, which `warped` phases
-    are warped to, or None. trained_on: one line. notes: one line each."""
+    Attributes:
+        settings: settings of the model.
+        skeleton: skeleton of all its motions.
+        networks: networks by name, `settings.networks`.
+        leg_reach: {"left": (shortest, longest), "right": ...}, metres from the top of the leg to the toe in the
+            training data (eq. 7.3).
+        examples: recorded movements in the normalised frame, at the model's rate, on its skeleton.
+        stature: metres.
+        joint_limits: (J, 3, 3) rad, from `limits.estimate_joint_limits` of the training data, or None.
+        reference: (N,) speed of the limb over evenly spaced phases, to which warped phases are warped, or None.
+        trained_on: one line about the training data.
+        notes: one line each.
+    """
 
     settings: ModelSettings
     skeleton: Skeleton
@@ -111,6 +129,7 @@ class ThrowModel:
 
 
 def _check_networks(model: ThrowModel) -> None:
+    """Raise InputError if the networks' names, control points or hidden layers differ from the settings."""
     settings = model.settings
     if set(model.networks) != set(settings.networks):
         raise InputError("model: networks", ", ".join(model.networks) or "none", ", ".join(settings.networks))
@@ -122,10 +141,11 @@ def _check_networks(model: ThrowModel) -> None:
 
 
 def _check_body(model: ThrowModel) -> None:
+    """Raise InputError if leg reach, stature, joint limits, reference curve or examples do not fit the model."""
     joints = len(model.skeleton)
     reach = model.leg_reach
     if set(reach) != {"left", "right"} or not all(0 <= low < high < 10.0 for low, high in reach.values()):
-        raise InputError("model: leg_reach", str(dict(reach))[:80], "(shortest, longest) metres of left and right")
+        raise InputError("model: leg_reach", str(dict(reach))[:80], "(shortest, longest) in metres, for left and right")
     if not 0.1 <= model.stature <= 10.0:
         raise InputError("model: stature", f"{model.stature:g} m", "0.1 to 10 m")
     limits = model.joint_limits
@@ -133,12 +153,12 @@ def _check_body(model: ThrowModel) -> None:
         raise InputError("model: joint_limits", f"shape {limits.shape}", f"({joints}, 3, 3): middle, lowest, highest")
     reference = model.reference
     if model.settings.phase == "warped" and reference is None:
-        raise InputError("model: reference", "none", "a speed curve, because its phases are warped")
+        raise InputError("model: reference", "none", "a speed curve, because the phases are warped")
     if reference is not None and (reference.ndim != 1 or len(reference) < 2 or not np.all(np.isfinite(reference))):
         raise InputError("model: reference", f"shape {reference.shape}", "(N,) finite speeds")
     for example in model.examples:
         where = f"model: example {example.name}"
         if not example.motion.skeleton.same_bones(model.skeleton):
-            raise InputError(where, "another skeleton", "the model's skeleton")
+            raise InputError(where, "a different skeleton", "the model's skeleton")
         if abs(example.motion.fps - model.settings.fps) > 1e-9:
             raise InputError(where, f"{example.motion.fps:g} frames per second", f"{model.settings.fps:g}, the model's")

@@ -1,8 +1,8 @@
-"""One phase-functioned network: its weights glide along a spline with the phase (Fredriksson §3.6.2 eq. 3.20-3.24);
-with one control point it is the plain feed-forward twin.
+"""A phase-functioned network: its weights follow a spline over the phase; with one control point it is feed-forward.
 
-`forward` is what training and use share; `PhaseNetwork.frame` is the same for one frame at a time, as fast as numpy
-goes.
+`forward` is shared by training and use; `PhaseNetwork.frame_network` is the same for one frame at a time, as fast as
+numpy allows.
+Source: Fredriksson section 3.6.2 eq. 3.20-3.24.
 """
 
 from __future__ import annotations
@@ -17,18 +17,26 @@ from ...motion.skeleton import frozen_array
 from .phases import weigh_points
 
 BOUND = 8.0
-"""Standard deviations from the mean of the training data within which a network knows what it says."""
+"""Standard deviations from the mean of the training data within which a network's output is reliable."""
 LEAST_SPAN = 0.5
-"""Metres, or shares of an axis, from the mean that are always near: some inputs hardly change in the training data."""
+"""Metres, or shares of an axis, from the mean that are always allowed: some inputs hardly vary in the training data."""
 
 
 def forward(weights, biases, x, theta, xp=np, keep=None):
-    """Outputs (..., out) for normalised inputs x (..., in) and control point weights theta (..., K).
+    """Evaluate a network.
 
-    weights: one (K, out, in) a layer. biases: one (K, out) a layer. Between layers stands an ELU, as in the PFNN
-    (Holden, Komura and Saito 2017); the last layer is linear (eq. 3.21). keep: for training with dropout, one array or
-    None for each layer, which multiplies what the layer is given: 0 or 1 / retention (eq. 3.27). xp: numpy or
-    jax.numpy."""
+    Args:
+        weights: one (K, out, in) per layer.
+        biases: one (K, out) per layer.
+        x: (..., in) normalised inputs.
+        theta: (..., K) control point weights.
+        xp: numpy or jax.numpy.
+        keep: for training with dropout, one array or None per layer, multiplied with the layer's input: 0 or 1 /
+            retention (eq. 3.27).
+    Returns:
+        (..., out) outputs. Between layers is an ELU, as in the PFNN (Holden, Komura and Saito 2017); the last layer
+        is linear (eq. 3.21).
+    """
     last = len(weights) - 1
     for layer, (weight, bias) in enumerate(zip(weights, biases)):
         if keep is not None and keep[layer] is not None:
@@ -40,8 +48,11 @@ def forward(weights, biases, x, theta, xp=np, keep=None):
 
 
 def _layer(weight, bias, x, theta, xp):
-    """eq. 3.24 and 3.20 the other way round: every control point's answer, then their weighted sum. That is the same
-    and spares blending (out, in) weights for every row of a batch."""
+    """Evaluate one layer: the output of every control point, then their weighted sum.
+
+    This is eq. 3.24 and 3.20 in the other order, with the same result, and avoids blending (out, in) weights for
+    every row of a batch.
+    """
     points, out, width = weight.shape
     if points == 1:
         return x @ weight[0].T + bias[0]
@@ -50,7 +61,7 @@ def _layer(weight, bias, x, theta, xp):
 
 
 def elu(x, xp=np):
-    """x above zero, exp(x) - 1 below."""
+    """Return x above zero, exp(x) - 1 below."""
     return xp.where(x > 0, x, xp.expm1(xp.minimum(x, 0)))
 
 
@@ -58,8 +69,14 @@ def elu(x, xp=np):
 class PhaseNetwork:
     """A trained network, arrays read-only.
 
-    weights: one (K, out, in) a layer, K control points. biases: one (K, out) a layer. input_mean, input_scale (in,) and
-    output_mean, output_scale (out,): the first layer is given (x - mean) / scale, the answer is y scale + mean."""
+    Attributes:
+        weights: one (K, out, in) per layer, K control points.
+        biases: one (K, out) per layer.
+        input_mean: (in,); the first layer receives (x - mean) / scale.
+        input_scale: (in,).
+        output_mean: (out,); the output is y scale + mean.
+        output_scale: (out,).
+    """
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -79,34 +96,36 @@ class PhaseNetwork:
 
     @property
     def points(self) -> int:
-        """Control points K; 1 for a feed-forward network."""
+        """Number of control points K; 1 for a feed-forward network."""
         return self.weights[0].shape[0]
 
     @property
     def inputs(self) -> int:
-        """Values that it is given."""
+        """Number of inputs."""
         return self.weights[0].shape[2]
 
     @property
     def outputs(self) -> int:
-        """Values that it answers."""
+        """Number of outputs."""
         return self.weights[-1].shape[1]
 
     @property
     def parameters(self) -> int:
-        """Trained numbers: weights and biases."""
+        """Number of trained values: weights and biases."""
         return sum(one.size for one in (*self.weights, *self.biases))
 
     def predict(self, x: np.ndarray, phase: np.ndarray) -> np.ndarray:
-        """Outputs (..., out) for inputs (..., in) at phases (...) of 0 .. 1, in the precision of weights and inputs."""
+        """Compute outputs (..., out) for inputs (..., in) at phases (...) of 0 .. 1.
+
+        The precision is that of weights and inputs.
+        """
         theta = weigh_points(phase, self.points)
         normal = (x - self.input_mean) / self.input_scale
         return forward(self.weights, self.biases, normal, theta) * self.output_scale + self.output_mean
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest input (in,) that is near what the network has seen, float32: `BOUND` scales or
-        `LEAST_SPAN` about the mean."""
+        """Lowest and highest input (in,) near the training data, float32; see `INPUT_BOUND` and `MIN_INPUT_SPAN`."""
         mean = self.input_mean.astype(float)
         span = np.maximum(BOUND * np.abs(self.input_scale.astype(float)), LEAST_SPAN)
         return (mean - span).astype(np.float32), (mean + span).astype(np.float32)
@@ -118,9 +137,12 @@ class PhaseNetwork:
 
 
 class FrameNetwork:
-    """A network prepared for single frames: float32, the scales inside the first and the last layer, all control points
-    of a layer in one matrix, so that a layer is one product of a matrix with a vector. Column by column in memory: the
-    product is up to half as fast again that way, and faster than blending the weights before it."""
+    """A network prepared for single frames.
+
+    Float32, the scales inside the first and the last layer, all control points of a layer in one matrix, so that a
+    layer is one matrix-vector product. Column-major in memory, which makes the product up to 50 % faster, and faster
+    than blending the weights first.
+    """
 
     def __init__(self, network: PhaseNetwork):
         weights, biases = _without_scales(network)
@@ -131,7 +153,7 @@ class FrameNetwork:
         ]
 
     def __call__(self, x: np.ndarray, theta: np.typing.ArrayLike) -> np.ndarray:
-        """Outputs (out,) float32 for inputs (in,), at control point weights (K,) (`weigh_points`)."""
+        """Compute outputs (out,) float32 for inputs (in,), at control point weights (K,) (`weigh_points`)."""
         x, theta = np.asarray(x, np.float32), np.asarray(theta, np.float32)
         last = len(self._layers) - 1
         for layer, (weight, bias) in enumerate(self._layers):
@@ -144,7 +166,7 @@ class FrameNetwork:
 
 
 def _without_scales(network: PhaseNetwork) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Weights and biases in float64 that need no normalised input and answer in full size."""
+    """Merge the normalisation into the weights and biases of the first and last layer, in float64."""
     weights = [np.asarray(w, float) for w in network.weights]
     biases = [np.asarray(b, float) for b in network.biases]
     mean, scale = network.input_mean.astype(float), network.input_scale.astype(float)
@@ -157,14 +179,15 @@ def _without_scales(network: PhaseNetwork) -> tuple[list[np.ndarray], list[np.nd
 
 
 def _float_of(values) -> np.dtype:
-    """float32 stays; anything else is float64."""
+    """Choose float32 for float32 values, float64 for all others."""
     return np.dtype(np.float32 if getattr(values, "dtype", None) == np.float32 else np.float64)
 
 
 def _check(network: PhaseNetwork) -> None:
-    """InputError where shapes do not fit together or a value is no number."""
+    """Raise InputError if shapes do not match or a value is not finite."""
     if not network.weights or len(network.weights) != len(network.biases):
-        raise InputError("network", f"{len(network.weights)} weights, {len(network.biases)} biases", "one each a layer")
+        raise InputError("network", f"{len(network.weights)} weights, {len(network.biases)} biases",
+                         "one of each per layer")  # fmt: skip
     width = len(network.input_mean) if network.input_mean.ndim == 1 else -1
     points = network.weights[0].shape[0]
     for layer, (weight, bias) in enumerate(zip(network.weights, network.biases), 1):
@@ -179,6 +202,6 @@ def _check(network: PhaseNetwork) -> None:
             raise InputError(f"network: {name}", f"shape {getattr(network, name).shape}", f"({size},)")
     scales = (network.input_mean, network.input_scale, network.output_mean, network.output_scale)
     if not all(np.isfinite(one).all() for one in (*network.weights, *network.biases, *scales)):
-        raise InputError("network", "a value that is no number", "finite numbers", "train it again")
+        raise InputError("network", "NaN or infinite values", "finite numbers", "train it again")
     if not (np.all(network.input_scale > 0) and np.all(network.output_scale > 0)):
-        raise InputError("network", "a scale that is not above zero", "positive scales", "train it again")
+        raise InputError("network", "a scale that is not positive", "positive scales", "train it again")

@@ -1,11 +1,13 @@
-"""How far a movement has come, 0 .. 1 (Fredriksson §7.4): by what the limb has travelled, by how far a leg is
-stretched, or by time warping (§9.3); and how much each control point of a phase-functioned network counts then.
+"""Phase of a movement, 0 to 1, and the weights of the control points of a phase-functioned network at a phase.
 
-Control points are weighed by a Catmull-Rom spline that does not close (§3.6.2 eq. 3.25-3.26). As printed, theta_k1 and
-theta_k2 do not sum to one with the others. The uniform spline through p_0 .. p_3 is
-p_1 + t (p_2 - p_0) / 2 + t^2 (p_0 - 5/2 p_1 + 2 p_2 - 1/2 p_3) + t^3 (3/2 (p_1 - p_2) + 1/2 (p_3 - p_0)); collecting
-each point's factors gives theta_k1 = 1 - 5/2 t^2 + 3/2 t^3 (printed: 1/2 t^3) and
-theta_k2 = 1/2 t + 2 t^2 - 3/2 t^3 (printed: 1/2 t^2); theta_k0 and theta_k3 are printed right.
+The phase is computed from the distance that the limb has travelled, from how far a leg is stretched, or by time
+warping (Fredriksson sections 7.4 and 9.3).
+
+Control points are weighted by a Catmull-Rom spline that does not close (section 3.6.2 eq. 3.25-3.26). As printed,
+theta_k1 and theta_k2 do not sum to one with the others. The uniform spline through p_0 .. p_3 is p_1 + t (p_2 - p_0)
+/ 2 + t^2 (p_0 - 5/2 p_1 + 2 p_2 - 1/2 p_3) + t^3 (3/2 (p_1 - p_2) + 1/2 (p_3 - p_0)); collecting the factors of each
+point gives theta_k1 = 1 - 5/2 t^2 + 3/2 t^3 (printed: 1/2 t^3) and theta_k2 = 1/2 t + 2 t^2 - 3/2 t^3 (printed: 1/2
+t^2); theta_k0 and theta_k3 are printed correctly.
 """
 
 from __future__ import annotations
@@ -18,20 +20,26 @@ from ...base.errors import InputError
 from ...base.vectors import distance_along
 
 AT_RELEASE = 0.66
-"""c of eq. 7.2: the phase at which the ball leaves, beside the third control point."""
-_STILL = 1e-6  # metres of travel below which a stretch has no distance to go by, and time takes its place
-_POINTS = 100  # of a reference curve
-_REACH = 0.25  # of a curve's length: how far the warping may leave the straight road
-_PACE = 0.02  # of the fastest speed: what a step costs that lets one curve wait
+"""c of eq. 7.2: the phase at which the ball leaves, near the third control point."""
+_STILL = 1e-6  # metres of travel below which time replaces distance
+_POINTS = 100  # samples of a reference curve on each side of the release
+_REACH = 0.25  # share of a curve's length: half-width of the warping band about the diagonal
+_PACE = 0.02  # share of the highest speed: cost of a step that advances only one of the two curves
 
 
 def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray:
-    """The motion phase (T,) of each frame: the part of its way that the limb's end has gone (eq. 7.2).
+    """Compute the motion phase (T,) of each frame: the travelled share of the path of the limb's end (eq. 7.2).
 
-    effector: (T, 3) metres. release: the fractional frame, where the phase is `AT_RELEASE`. fps: frames per second.
+    The second branch is printed as c + part; since the phase has to end at 1, it is c + (1 - c) part. Where the limb
+    does not move before or after the release, time replaces distance.
 
-    The second branch is printed as c + part; the phase is to end at 1, so it is c + (1 - c) part. Where the limb keeps
-    still before or after the release, time takes the place of distance."""
+    Args:
+        effector: (T, 3) m, positions of the limb's end.
+        release: fractional frame, where the phase is `AT_RELEASE`.
+        fps: frames per second.
+    Returns:
+        Phases (T,) of 0 to 1.
+    """
     _check(effector, fps)
     at = np.arange(len(effector), dtype=float)
     gone = distance_along(effector)
@@ -39,7 +47,7 @@ def motion_phase(effector: np.ndarray, release: float, fps: float) -> np.ndarray
 
 
 def _pinned(at: np.ndarray, gone: np.ndarray, release: float) -> np.ndarray:
-    """Phases from a rising quantity `gone` (T,) at frames `at` (T,): 0 at the start, c at the release, 1 at the end."""
+    """Compute phases from an increasing quantity (T,): 0 at the start, c at the release, 1 at the end."""
     then = np.interp(release, at, gone)
     before = _part(gone, gone[0], then, at=at, first=at[0], last=release)
     after = _part(gone, then, gone[-1], at=at, first=release, last=at[-1])
@@ -47,23 +55,37 @@ def _pinned(at: np.ndarray, gone: np.ndarray, release: float) -> np.ndarray:
 
 
 def _part(gone, low, high, at, first, last) -> np.ndarray:
-    """The part of low .. high, else of first .. last, clipped to 0 .. 1."""
+    """Compute the share of low .. high, or of first .. last in time if that range is empty, clipped to 0 .. 1."""
     if high - low < _STILL:
         gone, low, high = at, first, last
     return np.clip((gone - low) / max(high - low, 1e-12), 0.0, 1.0)
 
 
 def distance_phase(distance, reach: tuple[float, float], xp=np):
-    """The phase (...) of a leg whose toe is `distance` (...) metres from the leg's top (eq. 7.3), clipped to 0 .. 1.
+    """Compute the phase of a leg from the distance between its top and its toe (eq. 7.3).
 
-    reach: shortest and longest distance in the training data. xp: numpy or jax.numpy."""
+    Args:
+        distance: (...) m.
+        reach: shortest and longest distance in the training data, m.
+        xp: numpy or jax.numpy.
+    Returns:
+        Phases (...), clipped to 0 .. 1.
+    """
     low, high = reach
     return xp.clip((distance - low) / (high - low), 0.0, 1.0)
 
 
 def speed_curve(effector: np.ndarray, release: float, fps: float, points: int = _POINTS) -> np.ndarray:
-    """The limb's speed (2 points - 1,) as a curve that examples can be compared by: `points` evenly spaced moments
-    before the release and as many after it, the release in the middle, the fastest speed 1."""
+    """Compute the speed of a limb as a curve by which examples are compared.
+
+    Args:
+        effector: (T, 3) m.
+        release: fractional frame.
+        fps: frames per second.
+        points: number of evenly spaced samples before the release, and of those after it.
+    Returns:
+        (2 points - 1,) speeds, the release in the middle, the highest speed 1.
+    """
     _check(effector, fps)
     at = np.arange(len(effector), dtype=float)
     release = float(np.clip(release, 0.0, at[-1]))
@@ -74,13 +96,21 @@ def speed_curve(effector: np.ndarray, release: float, fps: float, points: int = 
 
 
 def reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, rounds: int = 3) -> np.ndarray:
-    """The speed curve (N,) that examples are warped to: their mean, warped to it again `rounds` times so that what they
-    share stays sharp.
+    """Compute the speed curve (N,) to which examples are warped.
 
-    examples: (effector (T, 3), release) of each. InputError where there is none."""
+    It is their mean; the curves are warped to it and averaged again `rounds` times, so that common features stay
+    sharp.
+
+    Args:
+        examples: effector (T, 3) m and release frame of each example.
+        fps: frames per second.
+        rounds: repetitions.
+    Raises:
+        InputError: if there is no example.
+    """
     curves = [speed_curve(effector, release, fps) for effector, release in examples]
     if not curves:
-        raise InputError("reference curve", "no example", "one at least")
+        raise InputError("reference curve", "no example", "at least one")
     mean = np.mean(curves, axis=0)
     for _ in range(rounds):
         mean = np.mean([_warped_to(curve, mean) for curve in curves], axis=0)
@@ -88,10 +118,18 @@ def reference_curve(examples: Iterable[tuple[np.ndarray, float]], fps: float, ro
 
 
 def warped_phase(effector: np.ndarray, release: float, fps: float, reference: np.ndarray) -> np.ndarray:
-    """The phase (T,) of each frame by dynamic time warping of the limb's speed to a reference curve (§9.3).
+    """Compute the phase (T,) of each frame by dynamic time warping of the limb's speed to a reference curve.
 
-    What looks alike has the same phase then, also where one subject winds up longer than another. The release stays
-    pinned to `AT_RELEASE`: both sides of it are warped alone. reference: of `reference_curve`."""
+    Similar moments then have the same phase, also where one subject winds up longer than another. The release stays
+    pinned to `AT_RELEASE`: both sides of it are warped separately.
+
+    Args:
+        effector: (T, 3) m.
+        release: fractional frame.
+        fps: frames per second.
+        reference: curve from `compute_reference_curve`.
+    Source: Fredriksson section 9.3.
+    """
     _check(effector, fps)
     half = (len(reference) + 1) // 2
     curve = speed_curve(effector, release, fps, half)
@@ -105,7 +143,7 @@ def warped_phase(effector: np.ndarray, release: float, fps: float, reference: np
 
 
 def _warped_to(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """A speed curve with its moments shifted to where the reference is most alike."""
+    """Shift the samples of a speed curve to where the reference is most similar."""
     half = (len(curve) + 1) // 2
     sides = []
     for mine, theirs in ((curve[:half], reference[:half]), (curve[half - 1 :], reference[half - 1 :])):
@@ -114,27 +152,35 @@ def _warped_to(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
 
 
 def warp(curve: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Where in `reference` (M,) each moment of `curve` (N,) belongs: indices (N,), rising, 0 at the start and M - 1 at
-    the end.
+    """Align a curve with a reference by dynamic time warping (Sakoe and Chiba 1978).
 
-    Dynamic time warping (Sakoe and Chiba 1978): the cheapest monotone road through |curve_i - reference_j|, within a
-    band about the straight one. A moment that belongs to several indices is given their middle; flat stretches of the
-    road are made to rise, because a phase that stands still says nothing."""
+    The path of lowest cost through |curve_i - reference_j| is searched within a band about the diagonal. A sample
+    that matches several indices gets their mean; flat parts of the path are made to increase, because a constant
+    phase carries no information.
+
+    Args:
+        curve: (N,) speeds.
+        reference: (M,) speeds.
+    Returns:
+        (N,) increasing indices into `reference`, 0 at the start and M - 1 at the end.
+    """
     cost = np.abs(curve[:, None] - reference[None, :])
     count, length = cost.shape
+    # best[i + 1, j + 1]: lowest cost of a path from the pair (0, 0) to the pair (i, j); row and column 0 are a border
     best = np.full((count + 1, length + 1), np.inf)
     best[0, 0] = 0.0
     band = max(int(_REACH * length), abs(count - length) + 1)
     for i in range(count):
         centre = i * (length - 1) // max(count - 1, 1)
         for j in range(max(0, centre - band), min(length, centre + band + 1)):
+            # predecessors: both curves advance, only the curve advances, only the reference advances
             step = min(best[i, j], best[i, j + 1] + _PACE, best[i + 1, j] + _PACE)
             best[i + 1, j + 1] = cost[i, j] + step
     return _rising(_middles(_road(best), count), length)
 
 
 def _road(best: np.ndarray) -> list[tuple[int, int]]:
-    """The cheapest road back from the last pair to the first."""
+    """Trace the path of lowest cost back from the last pair; return its pairs (i, j) from the first."""
     i, j = best.shape[0] - 1, best.shape[1] - 1
     road = []
     while i and j:
@@ -146,14 +192,14 @@ def _road(best: np.ndarray) -> list[tuple[int, int]]:
 
 
 def _middles(road: list[tuple[int, int]], count: int) -> np.ndarray:
-    """For each moment the middle of the indices that the road pairs it with."""
+    """Average the reference indices that the path pairs with each of `count` samples."""
     pairs = np.array(road)
     number = np.bincount(pairs[:, 0], minlength=count)
     return np.bincount(pairs[:, 0], pairs[:, 1], minlength=count) / number
 
 
 def _rising(indices: np.ndarray, length: int) -> np.ndarray:
-    """The road through the middles of its flat stretches, from 0 to length - 1, strictly rising."""
+    """Interpolate through the middles of the flat parts of a path: from 0 to length - 1, strictly increasing."""
     values, place = np.unique(indices, return_inverse=True)
     at = np.bincount(place, np.arange(len(indices))) / np.bincount(place)
     at[0], at[-1] = 0.0, len(indices) - 1.0
@@ -162,20 +208,28 @@ def _rising(indices: np.ndarray, length: int) -> np.ndarray:
 
 
 def _check(effector: np.ndarray, fps: float) -> None:
+    """Raise InputError if the positions are not (T, 3) finite metres or the frame rate is not positive."""
     if np.ndim(effector) != 2 or np.shape(effector)[1] != 3 or not len(effector):
-        raise InputError("phase", f"places of shape {np.shape(effector)}", "(T, 3), one frame at least")
+        raise InputError("phase", f"positions of shape {np.shape(effector)}", "(T, 3), at least one frame")
     if not (np.all(np.isfinite(effector)) and fps > 0):
-        raise InputError("phase", "a place or a rate that is no number", "metres and frames per second")
+        raise InputError("phase", "NaN or infinite values", "finite metres and frames per second")
 
 
 def weigh_points(phase, points: int = 4, xp=np):
-    """Weights (..., points) of the control points at phases (...) of 0 .. 1; they sum to one.
+    """Compute the weights of the control points at a phase; they sum to one.
 
-    The control points stand evenly, at 0, 1/3, 2/3 and 1 where they are four; phases beyond the ends count as the ends.
-    One point is a plain feed-forward network. xp: numpy or jax.numpy.
+    The control points are evenly spaced, at 0, 1/3, 2/3 and 1 if there are four; phases beyond the ends count as the
+    ends. One point is a plain feed-forward network. Written as one kernel around each point (the same four
+    polynomials, by distance); the points before the first and after the last repeat these (eq. 3.26), so their
+    weights are added to them.
 
-    Written as one kernel around each point (the same four polynomials, by distance); the points before the first and
-    after the last are the first and the last again (eq. 3.26), so their weights are added to those."""
+    Args:
+        phase: (...) of 0 .. 1.
+        points: number of control points.
+        xp: numpy or jax.numpy.
+    Returns:
+        (..., points) weights.
+    """
     phase = xp.clip(xp.asarray(phase), 0.0, 1.0)[..., None]
     if points == 1:
         return xp.ones_like(phase)
@@ -185,11 +239,15 @@ def weigh_points(phase, points: int = 4, xp=np):
 
 
 def weigh_points_at(phase: float, points: int = 4) -> list[float]:
-    """The same for one phase, without numpy: many times as fast for one frame. eq. 3.25 (corrected) and 3.26."""
+    """Compute the weights of the control points at one phase without numpy, many times as fast for a single frame.
+
+    Source: Fredriksson eq. 3.25 (corrected) and 3.26.
+    """
     if points == 1:
         return [1.0]
     along = min(max(phase, 0.0), 1.0) * (points - 1)
     k = min(int(along), points - 2)
+    # the phase lies between points k and k + 1 at the share t; k - 1 and k + 2 are clamped to the ends
     t = along - k
     out = [0.0] * points
     out[max(k - 1, 0)] += t * (t * (1.0 - 0.5 * t) - 0.5)
@@ -200,7 +258,7 @@ def weigh_points_at(phase: float, points: int = 4) -> list[float]:
 
 
 def _kernel(d, xp):
-    """A point's weight at a distance of `d` >= 0 points."""
+    """Evaluate a point's weight at a distance of `d` >= 0 points."""
     near = 1.0 + d * d * (1.5 * d - 2.5)
     far = 2.0 + d * (d * (2.5 - 0.5 * d) - 4.0)
     return xp.where(d < 1.0, near, xp.where(d < 2.0, far, 0.0))

@@ -1,10 +1,9 @@
-"""A description for a target that nobody threw at: the examples most like it, blended in step (Fredriksson §7.7 takes
-descriptions from recordings alone).
+"""Plan a motion for a new target: a description blended from the most similar examples.
 
-What a throw looks like depends on how the ball has to leave: how fast, how steeply, and how far and high the target is.
-The few examples nearest in that are gone through in step, by the phase of the limb (eq. 7.2) with the release pinned,
-and their bodies' hands and feet are averaged there; so are their paces, and the whole is played a little faster or
-slower where the speed asks for it.
+How a throw looks depends on how the ball has to leave (speed and elevation) and on the distance and height of the
+target. The few most similar examples are aligned by the phase of the limb (eq. 7.2) with the release pinned, and
+their hands, feet and paces are averaged; the result is played a little faster or slower where the speed requires it.
+Fredriksson section 7.7 takes descriptions from recordings alone.
 """
 
 from __future__ import annotations
@@ -25,20 +24,27 @@ from .kinematics import from_six, six
 from .phases import AT_RELEASE, motion_phase
 
 BLENDED = 4
-"""Examples that are blended at most."""
+"""Maximum number of examples that are blended."""
 PACE = (0.85, 1.15)
-"""Within which a blend is played slower or faster."""
-_STEEP, _FAST, _FAR, _HIGH = np.radians(3.0), 1.5, 0.35, 0.6  # rad, m/s, share and m that count as equally unlike
-_SHARP = 2.0  # how much more the nearest examples count
-_TIME = 0.25  # share of plain time in the phase, which keeps still limbs going
-_GRID = 200
-_VARIED = 0.7  # spread of the weights' logarithms with a seed
+"""Range of the playback rate of a blend."""
+_STEEP, _FAST, _FAR, _HIGH = np.radians(3.0), 1.5, 0.35, 0.6  # rad, m/s, log ratio and m of equal dissimilarity
+_SHARP = 2.0  # exponent by which the weights decrease with dissimilarity
+_TIME = 0.25  # share of plain time in the phase, so that it also increases where the limb does not move
+_GRID = 200  # intervals of the common phase axis
+_VARIED = 0.7  # standard deviation of the logarithm of the weights with a seed
 
 
 @dataclass(frozen=True, kw_only=True)
 class Wish:
-    """How a ball is to leave and where it is to go: speed m/s, elevation rad, distance m over the ground from where the
-    hips begin, height m of the target, limb: index into `EFFECTORS`."""
+    """How a ball has to leave, and its target.
+
+    Attributes:
+        speed: m/s.
+        elevation: rad above the horizontal.
+        distance: m over the ground from the first position of the hips to the target.
+        height: m of the target above the ground.
+        limb: index into `EFFECTORS`.
+    """
 
     speed: float
     elevation: float
@@ -49,8 +55,15 @@ class Wish:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Planned:
-    """A description, and what it was made of: names and weights (N,) of the examples; root (T, 3) m, their roots' mean
-    way, for where the body will stand; pace: by which they were sped up."""
+    """A planned description and its sources.
+
+    Attributes:
+        description: the description.
+        root: (T, 3) m, mean root path of the examples, to estimate where the body will be.
+        names: names of the blended examples.
+        weights: (N,) their weights.
+        pace: playback rate that was applied.
+    """
 
     description: Description
     root: np.ndarray
@@ -60,10 +73,16 @@ class Planned:
 
 
 def planned(examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed: int = 0) -> Planned:
-    """The description of a motion that lets a ball go as wished.
+    """Plan the description of a motion that releases the ball as requested.
 
-    launches (E, 3) m/s: how the ball left each example. seed: other weights, for another motion with the same aim; 0:
-    none. InputError where no example uses that limb."""
+    Args:
+        examples: examples of the model.
+        launches: (E, 3) m/s, velocity of the ball at the release of each example.
+        request: how the ball has to leave.
+        seed: other weights, for another motion with the same target; 0 for none.
+    Raises:
+        InputError: if no example uses that limb.
+    """
     chosen, weights = alike(examples, launches, wish, seed)
     taken = [examples[index] for index in chosen]
     speed = float(weights @ np.linalg.norm(launches[chosen], axis=1))
@@ -74,7 +93,14 @@ def planned(examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed:
 def alike(
     examples: Sequence[Example], launches: np.ndarray, wish: Wish, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Indices (N,) of the examples that are blended, nearest first, and their weights (N,), which sum to one."""
+    """Choose the examples to blend.
+
+    Args: see `plan_motion`.
+    Returns:
+        Indices (N,) of the examples, most similar first, and their weights (N,), which sum to one.
+    Raises:
+        InputError: if no example uses that limb.
+    """
     usable = np.array([n for n, example in enumerate(examples) if example.limb == wish.limb], int)
     if not len(usable):
         raise InputError("throw", "no example that uses this limb", "a model trained on examples of it")
@@ -88,8 +114,10 @@ def alike(
 
 
 def unlike(launches: np.ndarray, impacts: np.ndarray, wish: Wish) -> np.ndarray:
-    """(E,) how unlike examples are to what is wished, squared: by speed and steepness of the launches (E, 3) m/s most,
-    by distance and height of the impacts (E, 3) m a little."""
+    """Compute the squared dissimilarity (E,) of examples to a request.
+
+    Speed and elevation of the launches (E, 3) m/s count most, distance and height of the impacts (E, 3) m a little.
+    """
     speed, level = np.linalg.norm(launches, axis=1), np.hypot(launches[:, 0], launches[:, 1])
     steep = (arctan2(launches[:, 2], level) - wish.elevation) / _STEEP
     fast = (speed - wish.speed) / np.maximum(_FAST, 0.08 * speed)
@@ -98,10 +126,11 @@ def unlike(launches: np.ndarray, impacts: np.ndarray, wish: Wish) -> np.ndarray:
 
 
 def _blended(examples: list[Example], weights: np.ndarray, pace: float, wish: Wish) -> Planned:
-    """Hands, feet and roots of the examples averaged in step."""
+    """Average hands, feet and roots of the aligned examples."""
     fps = examples[0].motion.fps
     steps = np.unique(np.append(np.linspace(0.0, 1.0, _GRID + 1), AT_RELEASE))
     frames = np.array([np.interp(steps, _in_step(example), np.arange(len(example.motion))) for example in examples])
+    # frames (N, S): frame of each example at each common phase; times (S,): frame of the blend at that phase
     times = weights @ frames / pace
     release = float(weights @ [example.release for example in examples]) / pace
     count = int(np.floor(times[-1] + 1e-9)) + 1
@@ -117,7 +146,7 @@ def _blended(examples: list[Example], weights: np.ndarray, pace: float, wish: Wi
 
 
 def _in_step(example: Example) -> np.ndarray:
-    """(T,) rising from 0 to 1: the phase of the limb, never quite still."""
+    """Compute the progress (T,) of an example from 0 to 1, increasing: the phase of its limb mixed with time."""
     joint = chains_of(example.motion.skeleton).effectors[example.limb]
     places, _ = pose_kinematics(example.motion.skeleton, example.motion.root_positions, example.motion.rotations)
     last = len(example.motion) - 1
@@ -127,7 +156,11 @@ def _in_step(example: Example) -> np.ndarray:
 
 
 def _shown(example: Example, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Hands' and feet's places (N, 4, 3) m, hands' turns (N, 2, 6) and the root (N, 3) m at fractional frames (N,)."""
+    """Sample an example at fractional frames (N,).
+
+    Returns:
+        Positions of hands and feet (N, 4, 3) m, hand rotations (N, 2, 6) and the root (N, 3) m.
+    """
     skeleton = example.motion.skeleton
     root, local = cubic_at(example.motion, frames)
     places, turns = pose_kinematics(skeleton, root, local)
@@ -136,7 +169,7 @@ def _shown(example: Example, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _beyond(example: Example, effectors: np.ndarray) -> tuple[np.ndarray | None, np.ndarray | None]:
-    """What is known before and after the example, moved to where the blend begins and ends."""
+    """Move the effectors known before and after an example to where the blend begins and ends."""
     if example.before is None and example.after is None:
         return None, None
     first, last = _shown(example, np.array([0.0, len(example.motion) - 1.0]))[0]

@@ -1,4 +1,4 @@
-"""What networks learn from: the steps of all examples, their mirror images, their skeleton and their reach."""
+"""Training data of the networks: the steps of all examples, their mirror images, skeleton and leg reach."""
 
 from __future__ import annotations
 
@@ -15,11 +15,17 @@ from .features import stretch
 from .kinematics import Pose
 from .phases import reference_curve
 
-_MARGIN = 1e-6  # metres by which a leg's reach is widened, so that it is a range even where nothing moves
+_MARGIN = 1e-6  # metres by which a leg's reach is widened, so that it is never empty
 
 
 class Steps(NamedTuple):
-    """All steps n -> n + 1 of an example: states before and after (T - 1, ...), and what is told of each."""
+    """All steps n -> n + 1 of an example.
+
+    Attributes:
+        pose: states before, (T - 1, ...).
+        after: states after, (T - 1, ...).
+        window: network inputs of each step.
+    """
 
     pose: Pose
     after: Pose
@@ -27,35 +33,44 @@ class Steps(NamedTuple):
 
 
 def steps(example: Example, reference: np.ndarray | None = None) -> Steps:
-    """The example's steps. reference: the speed curve for warped phases."""
+    """Build the steps of an example.
+
+    Args:
+        example: the example.
+        reference: (N,) speed curve for warped phases, or None.
+    """
     states, window = poses(example), windows(describe(example), reference)
     return Steps(_rows(states, slice(-1)), _rows(states, slice(1, None)), _rows(window, slice(-1)))
 
 
 def joined(all_steps: Sequence[Steps]) -> Steps:
-    """The steps of several examples as those of one."""
+    """Join the steps of several examples."""
     return Steps(*(_stacked([steps[i] for steps in all_steps]) for i in range(3)))
 
 
 def with_mirrors(examples: Iterable[Example]) -> list[Example]:
-    """Each example and its mirror image."""
+    """Return each example, followed by its mirror image."""
     return [one for example in examples for one in (example, mirrored(example))]
 
 
 def shared_chains(examples: Sequence[Example]) -> Chains:
-    """The chains of the skeleton that all examples have; InputError where there is none or they differ."""
+    """Find the chains of the skeleton that all examples share.
+
+    Raises:
+        InputError: if there is no example, or the skeletons differ.
+    """
     if not examples:
-        raise InputError("examples", "none", "one throw or kick at least")
+        raise InputError("examples", "none", "at least one throw or kick")
     first = examples[0].motion.skeleton
     for example in examples:
         if not example.motion.skeleton.same_bones(first):
-            raise InputError(f"example {example.name}", "another skeleton", "that of the others", "retarget them first")
+            raise InputError(f"example {example.name}", "a different skeleton", "the skeleton of the other examples",
+                             "retarget them first")  # fmt: skip
     return chains_of(first)
 
 
 def leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
-    """Shortest and longest distance in metres from the top of a leg to its toe (eq. 7.3), over both legs' own
-    examples."""
+    """Measure the shortest and longest distance, metres, from the top of each leg to its toe (eq. 7.3)."""
     chains = shared_chains(examples)
     whole = joined([steps(example) for example in examples])
     found = {}
@@ -66,16 +81,16 @@ def leg_reach(examples: Sequence[Example]) -> dict[str, tuple[float, float]]:
 
 
 def reference_of(examples: Iterable[Example]) -> np.ndarray:
-    """The speed curve that warped phases of these examples are warped to (§9.3)."""
+    """Build the speed curve (N,) to which warped phases of these examples are warped (section 9.3)."""
     told: list[Description] = [describe(example) for example in examples]
     return reference_curve([(one.effectors[:, one.limb], one.release) for one in told], told[0].fps if told else 1.0)
 
 
 def _rows(arrays, cut: slice):
-    """The same rows of every array of a Pose or Windows; what is None stays so."""
+    """Slice every array of a Pose or Windows; None stays None."""
     return type(arrays)(*(None if array is None else array[cut] for array in arrays))
 
 
 def _stacked(parts: list):
-    """Poses or Windows one after the other."""
+    """Join Poses or Windows along the first axis."""
     return type(parts[0])(*(None if rows[0] is None else np.concatenate(rows) for rows in zip(*parts)))

@@ -82,7 +82,7 @@ def test_refuses_what_cannot_be():
     part, frame = InHand("right", made.grip), made.release * 30.0
     with pytest.raises(InputError, match="frames before and after"):
         corrected(made.motion, part, 1.0, np.array([12.0, 0.0, 1.0]), BASEBALL)
-    with pytest.raises(InputError, match="some way off"):
+    with pytest.raises(InputError, match="some distance away"):
         corrected(made.motion, part, frame, grip_point(made.motion, part, np.array([frame]))[0, 0], BASEBALL)
 
 

@@ -177,7 +177,7 @@ def test_networks_are_asked_only_for_what_is_near_what_they_know(example, model)
 def test_networks_that_lose_the_body_are_told_in_a_line(example, model, answer):
     lost = {name: by_heart(rows) for name, rows in training_set([example], model.settings).items()}
     object.__setattr__(lost["hip"], "said", np.full_like(lost["hip"].said, answer))
-    with pytest.raises(InputError, match="lose the body in frame 1"):
+    with pytest.raises(InputError, match="an invalid body in frame 1"):
         generate(replace(model, networks=lost), describe(example), options=PLAIN)
 
 
@@ -185,7 +185,7 @@ def test_what_does_not_fit_the_model_is_told(example, model):
     told = describe(example)
     with pytest.raises(InputError, match="60 frames per second"):
         generate(model, replace(told, fps=60.0))
-    with pytest.raises(InputError, match="rotations of the hands"):
+    with pytest.raises(InputError, match="hand rotations"):
         generate(model, replace(told, hands=None))
     with pytest.raises(InputError, match="share"):
         Options(share=1.5)

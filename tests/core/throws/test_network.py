@@ -79,7 +79,7 @@ def test_float32_weights_stay_float32_and_arrays_are_read_only():
     ("input_mean", np.zeros(6), "layer 1"),
     ("output_scale", np.zeros(3), "scale"),
     ("output_scale", np.ones(2), "output_scale"),
-    ("input_scale", np.full(7, np.nan), "no number"),
+    ("input_scale", np.full(7, np.nan), "NaN"),
 ])
 def test_what_does_not_fit_is_said(field, value, said):
     network = made()

@@ -201,9 +201,9 @@ def test_an_array_that_is_missing_or_too_many_is_told(tmp_path, name):
 
 
 @pytest.mark.parametrize("change, said", [
-    (lambda h: h.update(version=2), "another Beyond Mocap"),
+    (lambda h: h.update(version=2), "Beyond Mocap version"),
     (lambda h: h.update(version=[1]), "version"),
-    (lambda h: h.update(format="else"), "no throw model"),
+    (lambda h: h.update(format="else"), "not a throw model"),
     (lambda h: h["settings"].update(kind="tree"), "hierarchy or single"),
     (lambda h: h["settings"].update(units=5), "hidden layers"),
     (lambda h: h["settings"].update(points=10**30), "points"),
@@ -215,7 +215,7 @@ def test_an_array_that_is_missing_or_too_many_is_told(tmp_path, name):
     (lambda h: h.update(leg_reach={"left": [1, 0.5], "right": [0, 1]}), "leg_reach"),
     (lambda h: h.update(stature="tall"), "stature"),
     (lambda h: h.update(stature=0), "stature"),
-    (lambda h: h["examples"].pop(), "belongs to nothing"),
+    (lambda h: h["examples"].pop(), "unknown array"),
     (lambda h: h["examples"][0].update(limb=4), "limb"),
     (lambda h: h["examples"][0].update(impact=[1, 2]), "impact"),
     (lambda h: h.update(extra=1), "extra"),

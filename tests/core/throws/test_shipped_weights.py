@@ -107,4 +107,5 @@ def test_a_rate_that_shows_no_throw_is_refused():
 def test_a_ball_faster_than_any_human_throws_is_told():
     small = adult_skeleton()
     giant = replace(small, offsets=small.offsets * 5.0, end_offsets=small.end_offsets * 5.0)
-    assert any("no human" in line for line in throw_at(shipped_model("throw"), Order((30.0, 0.0, 1.0)), giant).warnings)
+    assert any("human limit" in line
+               for line in throw_at(shipped_model("throw"), Order((30.0, 0.0, 1.0)), giant).warnings)  # fmt: skip
