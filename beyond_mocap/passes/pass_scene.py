@@ -321,7 +321,8 @@ def _check_passes(scene: PassScene) -> None:
             found = f"{after.giver} does not have the ball"
             again = number == len(scene.passes)
             where = "pass 1 when repeated" if again else f"pass {number + 1}"
-            raise InputError(where, found, f"a pass from {before.receiver}, who receives pass {number}", "change one of them")
+            raise InputError(where, found, f"a pass from {before.receiver}, who receives pass {number}",
+                             "change one of them")
 
 
 def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:
@@ -358,7 +359,7 @@ def _check_meetings(scene: PassScene) -> None:
         places[one.receiver] = one.at or places[one.receiver]
         for other, place in places.items():
             if other != one.receiver and math.dist(place, places[one.receiver]) < LEAST_APART:
-                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_APART} m or more between players")
+                raise InputError(f"pass {number}: at", f"{other} stands there", f"{LEAST_APART} m or more between them")
 
 
 def _check_numbers(scene: PassScene) -> None:

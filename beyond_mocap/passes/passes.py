@@ -319,7 +319,7 @@ class _Reach:
             raise InputError("example", found, f"a time up to {motion.duration:.2f} s")
         found = strongest(motion.frames(first, min(last, len(motion))), part, side, tool)
         if found is None:
-            raise InputError("example", f"no {part} strike in that stretch of {example.clip}", "a stretch with a whole strike")
+            raise InputError("example", f"no {part} strike there in {example.clip}", "a stretch with a whole strike")
         return found
 
 

@@ -148,7 +148,7 @@ def _pass_out(one: Pass) -> dict:
         if value != getattr(Pass, name):
             out[name] = list(value) if name == "at" else value
     out.pop("example", None)
-    if one.example is not None and one.example.hit is None:  # a hit motion that comes from elsewhere has no recording to name
+    if one.example is not None and one.example.hit is None:  # other hit motions have no recording
         told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
         out["example"] = {name: value for name, value in told.items() if value is not None}
     return out

@@ -79,7 +79,7 @@ class Sender:
             return socket.create_connection((LOOPBACK, self.port), timeout=5.0)
         except OSError as error:
             found = f"no listener ({error.strerror or error})"
-            raise InputError(f"port {self.port}", found, "a program that listens", "start the stream in Blender first") from None
+            raise InputError(f"port {self.port}", found, "a listener", "start the stream in Blender first") from None
 
     def _called(self, stopped: Callable[[], bool]) -> socket.socket | None:
         """Wait for the first connection; None if it was stopped before."""
