@@ -314,7 +314,7 @@ def _net(scene, net: Net | None) -> None:
 
 def _own_net(scene) -> bpy.types.Object | None:
     """Find the net that this extension created."""
-    return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # the user may have renamed it
+    return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # any name
 
 
 def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:

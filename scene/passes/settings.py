@@ -106,7 +106,7 @@ class BeyondMocapTouch(bpy.types.PropertyGroup):
     """One touch of the ball that was solved from tracking data. Its name is the player's; empty: unknown."""
 
     player: StringProperty(name="Player", description="Player who touches the ball")
-    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=3, description="Time of the touch on the track's clock in seconds")
+    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=3, description="Seconds on the track's clock")
     part: StringProperty(name="Part", description="Part of the body that touches the ball")
     kind: StringProperty(name="Kind", description="Kind of touch")
     words: StringProperty(name="Labels", description="Labels of the key moment for this touch")

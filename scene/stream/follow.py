@@ -260,7 +260,7 @@ def pose_body(
     bones.foreach_set("rotation_quaternion", every.ravel())
     top = bones[skeleton.names[0]]
     shift = lie.to_armature(root) - np.array(top.bone.head_local)
-    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # this assignment also makes Blender update the pose
+    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
 
 
 def keep_recording(context: bpy.types.Context, motion: Motion, name: str = "Recorded") -> bpy.types.Object:
