@@ -247,7 +247,7 @@ def _headed(skeleton: Skeleton, rotations: np.ndarray) -> float:
 def _lying_poses(motion: Motion, ways_up: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray]:
     """Build local rotations (J, 4) of landing and of lying, on the lower side, the head in its current direction."""
     left = _axes(motion.skeleton, motion.rotations[-1:])[1][0]
-    neutral = neutral_stance(motion.skeleton, concatenate([motion, *ways_up]))  # upright at least in the recordings of getting up
+    neutral = neutral_stance(motion.skeleton, concatenate([motion, *ways_up]))  # upright at least there
     poses = []
     for settled in (False, True):
         pose = on_the_side(neutral, bool(left[2] < 0.0), settled)

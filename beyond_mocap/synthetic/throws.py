@@ -214,7 +214,7 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
     change = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
     if not len(change):
         raise InputError(
-            "throw", "a target too high, too low or too far", f"one within reach at {speed:g} m/s", "throw faster or nearer"
+            "throw", "a target too high, too low or too far", f"one that {speed:g} m/s reach", "throw faster or nearer"
         )
     zeros = instants[change] + (instants[1] - instants[0]) * off[change] / (off[change] - off[change + 1])
     return float(zeros[np.argmin(np.abs(zeros))])
@@ -229,7 +229,7 @@ def _wanted_elevation(way: np.ndarray, speed: float) -> float:
     level, up = float(np.hypot(way[0], way[1])), float(way[2])
     inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
-        raise InputError("throw", "a target out of reach", f"one within reach at {speed:g} m/s", "throw faster or nearer")
+        raise InputError("throw", "a target out of reach", f"one that {speed:g} m/s reach", "throw faster or nearer")
     return float(np.arctan2(speed**2 - np.sqrt(inside), tables.GRAVITY * level))
 
 

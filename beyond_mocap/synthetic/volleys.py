@@ -27,7 +27,7 @@ BEFORE, AFTER = 1.6, 1.9
 """Seconds of the clip before and after the touch."""
 
 _BENT = 0.012  # m by which the hips are lower when ready for a ball than in standing
-_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: longest reach, and the distance over which it is approached
+_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: longest reach, and range over which it is eased
 
 
 @dataclass(frozen=True, kw_only=True)
