@@ -80,7 +80,7 @@ class PlayerMotion:
     Attributes:
         take: motion with contacts and provenance, as `synthesize` gives it.
         gaps: (K,) m between part and ball at each strike, NaN where the player misses.
-        moved: (K,) m by which the part was moved to meet the ball.
+        part_shifts: (K,) m by which the part was moved to meet the ball.
         warnings: what differs from the orders.
     """
 
@@ -111,7 +111,7 @@ def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], 
     Returns:
         The motion with its gaps and warnings.
     Raises:
-        InputError: for orders outside the scene or two at one time.
+        InputError: for orders outside the scene, or two at one time.
         Cancelled: if `cancelled` returns True.
     """
     from threadpoolctl import threadpool_limits
@@ -274,7 +274,7 @@ class _Body:
         travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
-        # both goals as the nearest angle to the rough heading, so that no weighted mean goes the long way
+        # both goals as the nearest angle to the rough heading, so that no weighted mean turns past half a turn
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
         trust = weights.sum(axis=0) + 1e-6
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust

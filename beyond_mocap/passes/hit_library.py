@@ -51,7 +51,7 @@ class LibraryHit:
     Attributes:
         clip: index of the clip in the library.
         hit: the hit motion, in the clip's own frames.
-        labelled: whether the clip's labels name the moment; then the key is the labelled one.
+        is_labelled: whether the clip's labels name the moment; then the key is the labelled one.
     """
 
     clip: int

@@ -31,9 +31,9 @@ from ..motion.track import zero_phase_hann
 _SIDED = ("foot", "hand", "tool")
 _SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
 _APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
-_SLOW = 0.4  # of the highest speed on the way: at most so fast is a part at the end of its hit motion
+_SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
 _RISES = 0.03  # m: least rise after the strike for the high frame to lie after it
-# with an automatic threshold: least rise in m above the part's usual height, and least speed in m/s, of a hit
+# with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
 
@@ -331,7 +331,7 @@ def _apart(speed: np.ndarray, fps: float) -> list[int]:
 def _threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
     """Compute the height in m that best divides the peaks into low and high ones (Otsu 1979).
 
-    It is at least a part's least rise above its usual height: a foot on the ground, head and chest of a standing
+    It is at least a part's least rise above its typical height: a foot on the ground, head and chest of a standing
     person.
     """
     usual = float(np.percentile(height, 50 if part in ("head", "chest") else 10))

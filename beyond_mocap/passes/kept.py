@@ -1,6 +1,7 @@
 """Cache of a library's hit analysis, stored as plain `.npz` arrays beside the library's own cache.
 
-A file that is missing, damaged or made from other recordings is ignored; a folder that cannot be written is left alone.
+A file that is missing, damaged or computed from other recordings is ignored; a folder that cannot be written is left
+alone.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def load(library: Library, name: str) -> dict[str, np.ndarray] | None:
         with np.load(Path(place) / f"{name}.npz", allow_pickle=False) as arrays:
             found = {part: arrays[part] for part in arrays.files}
         return found if bytes(found.pop("of").tobytes()) == _of(key) else None
-    except Exception:  # a damaged file can fail in any of zipfile's and numpy's own ways
+    except Exception:  # a damaged file can raise any error of zipfile and numpy
         return None
 
 

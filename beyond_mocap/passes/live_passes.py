@@ -2,7 +2,7 @@
 
 The holder of the ball repeats the strike that the user has just done, and the ball goes to the player whom the user
 chose. Until the user acts, all players stand and the ball lies at the holder's feet. A pass is planned from where all
-players stand, only giver and receiver are rebuilt, and it is inserted into the running scene when it is ready. The
+players stand, only passer and receiver are rebuilt, and it is inserted into the running scene when it is ready. The
 receiver stops the ball and is the next to act.
 """
 
@@ -68,7 +68,7 @@ class Rally:
         players: name -> motion up to now and from now on.
         ball: its path on the scene's clock.
         start: s at which the rally began.
-        free: s from which on the holder can act.
+        ready_time: s from which on the holder can act.
         passes: number of passes played.
     """
 
@@ -84,7 +84,7 @@ class Rally:
         """Build the rally with a pass that begins on the next frame after `at` s.
 
         Args:
-            piece: the pass.
+            live_pass: the pass.
             at: s on the scene's clock.
         Returns:
             The rally: both players' motions blend into the pass, everything before it stays.
@@ -103,13 +103,13 @@ class Piece:
     """One pass from standing to standing, with its own clock from 0.
 
     Attributes:
-        giver: name.
+        giver: name of the player who passes.
         receiver: name.
-        motions: name -> motion, of giver and receiver.
+        motions: name -> motion, of passer and receiver.
         ball: its path.
-        strike: s of the giver's strike.
+        strike: s of the passer's strike.
         seconds: s until the receiver can act.
-        clip: path of the recording that the giver's strike comes from.
+        clip: path of the recording that the passer's strike comes from.
         warnings: what differs from the request.
     """
 

@@ -72,7 +72,7 @@ class _Tried:
         seconds: (N,) s.
         velocity: (N, 3) m/s at launch.
         cost: (N,) m/s, infinite where a flight is impossible.
-        reached: whether any flight reaches the target, regardless of a net.
+        is_reached: whether any flight reaches the target, regardless of a net.
     """
 
     option: np.ndarray
@@ -94,7 +94,7 @@ def choose(court: Court, progress: Callable[[float, str], None]) -> list[Link]:
     """Choose every strike of a scene.
 
     Args:
-        court: the scene with its sites.
+        problem: the scene with its sites.
         progress: receives the share of the work done and a short text.
     Returns:
         The strikes with their flights, in order of time.

@@ -48,7 +48,7 @@ IN_THE_WAY, PERSON, TALL = 6.0, 0.45, 1.9
 THROUGH = 0.35 * IN_THE_WAY
 """Cost from which on a ball meets the body itself."""
 PUSHED = 2.0
-"""m/s of cost for pushing a ball across the part's direction; pushing it the opposite way costs twice as much."""
+"""m/s of cost for pushing a ball across the part's direction; pushing it backward costs twice as much."""
 RISES_STILL, PER_RISE = 1.0, 0.5
 """m/s upward with which a ball can still arrive, and cost of each further m/s: it has bounced a moment ago."""
 OWN_BODY, TRUNK, TRUNK_FROM = 8.0, 0.22, 0.8
@@ -73,7 +73,7 @@ class Site:
         tool: what is in the hand.
         size: size of the body over that of the library's skeleton.
         moments: moments with which the player can strike.
-        asked: the pass that goes out; None for the last strike.
+        requested: the pass that goes out; None for the last strike.
     """
 
     player: str
@@ -100,7 +100,7 @@ class Natural:
     Attributes:
         starts: (M, 3) m.
         velocities: (M, 3) m/s.
-        chosen: index of the one that was taken.
+        chosen_index: index of the one that was taken.
     """
 
     starts: np.ndarray
@@ -177,7 +177,7 @@ class Court:
 
         Args:
             number: index of the pass.
-            ways: (N, S, 3) m, trajectories.
+            trajectories: (N, S, 3) m, trajectories.
         Returns:
             (N, P) m/s of cost.
         """
@@ -187,7 +187,7 @@ class Court:
         """Whether trajectories clear the net, if there is one.
 
         Args:
-            ways: (N, S, 3) m, trajectories.
+            trajectories: (N, S, 3) m, trajectories.
         Returns:
             (N,) bool.
         """
@@ -266,7 +266,7 @@ def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarr
     Args:
         moments: N moments.
         facing: (N,) rad, headings.
-        whence: (2,) m, vector to where the ball comes from.
+        origin: (2,) m, vector to where the ball comes from.
     Returns:
         (N,) m/s.
     """
@@ -279,7 +279,7 @@ def misses(ways: np.ndarray, speeds: np.ndarray, toward: np.ndarray, bounces: in
     """Compute how far natural trajectories pass their target after the requested bounces.
 
     Args:
-        ways: (N, T, 3) m, trajectories.
+        trajectories: (N, T, 3) m, trajectories.
         speeds: (N, T, 3) m/s, velocities on them.
         toward: (3,) m, target.
         bounces: requested number of bounces.
@@ -344,7 +344,7 @@ def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Compute the cost of flying through players.
 
     Args:
-        ways: (N, S, 3) m, trajectories.
+        trajectories: (N, S, 3) m, trajectories.
         others: (P, 2) m, places of the players.
     Returns:
         (N, P) m/s.
@@ -361,10 +361,10 @@ def out_of_the_way(ways: np.ndarray, others: np.ndarray) -> np.ndarray:
 
 
 def through_body(ways: np.ndarray, radius: float, place: np.ndarray, tall: float) -> np.ndarray:
-    """Compute the cost of flying through the trunk of the giver or receiver.
+    """Compute the cost of flying through the trunk of the passer or receiver.
 
     Args:
-        ways: (N, S, 3) m, trajectories.
+        trajectories: (N, S, 3) m, trajectories.
         radius: of the ball, m.
         place: (2,) m, the player.
         tall: upper end of the trunk, m.
@@ -393,7 +393,7 @@ def arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None
 
 
 def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Compute the cost of pushing a ball other than the way that the part moves.
+    """Compute the cost of pushing a ball in another direction than the part moves.
 
     Args:
         arriving: (N, 3) m/s of the balls.
@@ -421,7 +421,7 @@ def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
     """Whether balls go over the net wherever they cross it.
 
     Args:
-        ways: (N, S, 3) m, trajectories.
+        trajectories: (N, S, 3) m, trajectories.
         radius: of the balls, m.
         net: the net.
     Returns:

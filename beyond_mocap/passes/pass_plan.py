@@ -47,7 +47,7 @@ def first_time(court: Court, order: HitOrder, need: Need) -> float:
     """Compute the time of the first strike: when its player is ready and the serve has arrived.
 
     Args:
-        court: the scene with its sites.
+        problem: the scene with its sites.
         order: the first strike.
         need: seconds that a player needs.
     Returns:
@@ -65,7 +65,7 @@ def in_time(court: Court, chain: list[Link], orders: Sequence[HitOrder], places:
     """Lengthen flights until every player has enough time for their strikes.
 
     Args:
-        court: the scene with its sites.
+        problem: the scene with its sites.
         chain: the strikes.
         orders: their orders.
         places: (K, 3) m, the ball at each strike.
@@ -107,7 +107,7 @@ def _longer(court: Court, chain: list[Link], which: Iterable[int], lack: float, 
 
     Args:
         which: indices of the flights that may be longer.
-        lack: seconds that are missing.
+        missing: seconds that are missing.
         places: (K, 3) m, the ball at each strike.
     """
     fps = court.scene.fps
@@ -325,7 +325,7 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
     """Solve flights and ball places together; some flights may become some frames longer or shorter.
 
     Args:
-        court: the scene with its sites.
+        problem: the scene with its sites.
         chain: the K strikes.
         places: (K, 3) m, first estimate of the balls' places.
         first: s of the first strike.
@@ -401,7 +401,7 @@ def _arriving(court: Court, chain, places, begun: tuple[float, float], leaving, 
     """Compute the serve and the velocities (K, 3) m/s with which all balls arrive.
 
     Args:
-        begun: s of the first strike, and for how many s the ball has flown by then.
+        serve_times: s of the first strike, and for how many s the ball has flown by then.
     """
     serve, served = _served(court, places[0], *begun)
     seconds = np.array([link.seconds for link in chain[:-1]])

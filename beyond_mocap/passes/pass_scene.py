@@ -90,8 +90,8 @@ class Pass:
         receiver: name of the player who receives.
         kind: one of KINDS.
         bounces: number of bounces of the ball on its trajectory.
-        part: part of the passing player's body that strikes; None: their usual one.
-        side: its side; None: their usual one.
+        part: part of the passing player's body that strikes; None: as in Player.
+        side: its side; None: as in Player.
         seconds: travel time of the ball; None: from the motion.
         at: (x, y) m where the receiver meets the ball; None: where they stand.
         example: recording to resemble; None: any strike of the kind.
@@ -321,8 +321,7 @@ def _check_passes(scene: PassScene) -> None:
             found = f"{after.giver} does not have the ball"
             again = number == len(scene.passes)
             where = "pass 1 when repeated" if again else f"pass {number + 1}"
-            raise InputError(where, found, f"a pass from {before.receiver}, who receives pass {number}",
-                             "change one of them")
+            raise InputError(where, found, f"a pass from {before.receiver}, who gets pass {number}", "change either")
 
 
 def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:

@@ -54,7 +54,7 @@ class PlayerPasses:
         name: the player's name.
         take: motion, contacts and provenance.
         gaps: (K,) m between part and ball at each of their strikes; NaN where they miss.
-        moved: (K,) m by which the part was moved to meet the ball.
+        part_shifts: (K,) m by which the part was moved to meet the ball.
     """
 
     name: str

@@ -89,7 +89,7 @@ def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
     """Parse a scene from a text, or from the JSON object of one.
 
     Args:
-        said: the text or object.
+        content: the text or object.
         name: name of the scene in error messages.
     Returns:
         The scene.

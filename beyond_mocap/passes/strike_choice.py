@@ -43,7 +43,7 @@ class Choice:
     Attributes:
         part: part that strikes.
         measured: its hit motions.
-        words: labels of each hit motion at its strike.
+        labels: labels of each hit motion at its strike.
     """
 
     part: str
@@ -139,7 +139,7 @@ class StrikeMoments:
         hits: (H,) hit motions.
         which: (N,) index into `hits`.
         frame: (N,) frame in the clip's own rate.
-        struck: the part at these moments.
+        part_states: the part at these moments.
         lead: (N,) s from the hit motion's first frame.
         trail: (N,) s to the hit motion's last frame.
         travel: (N,) m, how far the body travels on the ground in the hit motion.

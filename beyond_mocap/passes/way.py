@@ -26,7 +26,7 @@ LEAD, TIMELY = 1.6, 0.4
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
 CROUCHED, LIFTED = 3.0, 0.25
-"""m/s of unrest for each metre of the hips below or above their usual height, and for each foot in the air."""
+"""m/s of unrest for each metre of the hips below or above their typical height, and for each foot in the air."""
 WALK, HASTE = 1.1, 2.2
 """m/s from one place to the next: where time allows, and where it does not."""
 SPEEDING = 1.6
@@ -98,7 +98,7 @@ class Placed:
         library: the library of the clip.
         order: the order that it carries out.
         turn: rad about the vertical, from clip to world.
-        own_place: (2,) m, the clip's root at the strike, clip frame.
+        clip_place: (2,) m, the clip's root at the strike, clip frame.
         first: first frame that is played, in the clip's own rate: the hit motion with its run-up.
         last: last frame that is played: the hit motion with its run-out.
     """
@@ -172,7 +172,7 @@ class Placed:
         It reaches to where the body is at rest, or nearest to rest; each second of it is worth TIMELY m/s.
 
         Args:
-            way: -1 for the run-up, 1 for the run-out.
+            direction: -1 for the run-up, 1 for the run-out.
         Returns:
             Seconds.
         """

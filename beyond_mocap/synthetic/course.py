@@ -64,7 +64,7 @@ class Course:
     Attributes:
         times: (N,) s, 0 at the first requested frame.
         speed: (N,) m/s.
-        gear: (N,) m/s, the same speed scaled to an adult's leg, with which the tables are read.
+        adult_speed: (N,) m/s, the same speed scaled to an adult's leg, with which the tables are read.
         direction: (N,) rad, travel relative to the heading.
         heading: (N,) rad.
         path: (N, 2) m.
@@ -134,7 +134,7 @@ def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndar
     It is higher when going backward or sideways, or when turning on the spot.
 
     Args:
-        gear: (T,) m/s.
+        adult_speed: (T,) m/s.
         direction: (T,) rad, travel relative to the heading.
         turn_rate: (T,) rad/s.
     Returns:

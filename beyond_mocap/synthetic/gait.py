@@ -73,7 +73,7 @@ def gait_posture(course: Course, neutral: Neutral, style: GaitStyle = GaitStyle(
     """Build the posture at the requested frames of a plan.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         neutral: neutral stance of the body.
         style: style of the gait.
         seed: of the variation.
@@ -88,7 +88,7 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
     """Plan the stances of one foot: below the hips in the middle of each stance, apart from width and lean.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         neutral: neutral stance of the body.
         style: style of the gait.
         side: 0 left, 1 right.
@@ -157,7 +157,7 @@ def posture_over(
     """Build the posture at all moments of a plan for given stances.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         steps: stances of the left and the right foot.
         neutral: neutral stance of the body.
         style: style of the gait.
@@ -265,7 +265,7 @@ def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) ->
     """Compute hips, pelvis, spine and head at all N moments.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         neutral: neutral stance of the body.
         style: style of the gait.
         seed: of the variation.
@@ -345,7 +345,7 @@ def hip_height(course: Course, neutral: Neutral, style: GaitStyle) -> np.ndarray
     """Compute the height of the hip joints: in mid-stance by the knee's flexion there, plus the bounce.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         neutral: neutral stance of the body.
         style: style of the gait.
     Returns:
@@ -378,7 +378,7 @@ def pose_arms(course: Course, style: GaitStyle, seed: int) -> np.ndarray:
     """Compute the arms: each swings forward together with the other side's leg.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         style: style of the gait.
         seed: of the variation.
     Returns:

@@ -65,7 +65,7 @@ class Strike:
         at: share of the right foot's swing at which it touches.
         sink: rows (time, metres that the hips are lowered).
         head: nod in degrees.
-        fling: share of the arms' and trunk's rows that is blended over the run.
+        blend_share: share of the arms' and trunk's rows that is blended over the run.
     """
 
     foot: tuple
@@ -269,7 +269,7 @@ def dribble(
         skeleton: any humanoid skeleton; default: the project's adult.
         fps: frames per second.
         seed: of the gait's variation.
-        way: turn_rate, phase as for `build_gait`.
+        gait_options: turn_rate, phase as for `build_gait`.
     Returns:
         The motion.
     """

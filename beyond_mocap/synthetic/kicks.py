@@ -177,7 +177,7 @@ def contact(
         style: style of the kick.
         neutral: neutral stance of the body.
         foot: "left" or "right".
-        ways: (N, 2) lift and loft of each variant.
+        variants: (N, 2) lift and loft of each variant.
     Returns:
         places: (N, 2, 3) m, ankle and toe joint.
         velocities: (N, 2, 3) m/s.

@@ -42,7 +42,7 @@ _CUSHION = 0.05  # m over which the ground stops the fall
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
 _HASTE = 1.25  # playback rate: players get up faster than performers in a studio
 _LEAD = 0.4  # s before the hips rise at which a recording of getting up starts
-_RISEN = 0.04  # m of the hips above where they lay, from which getting up begins
+_RISEN = 0.04  # m above their lowest height that the hips rise before getting up begins
 _SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # m/s^2 of swapped markers, and s before the end in which they are searched
 
 
@@ -52,11 +52,11 @@ class Landed:
 
     Attributes:
         motion: the recording, frame by frame as it was, and what follows.
-        recorded: number of recorded frames that are kept: all except a few after a jump of markers just before the end.
-        touched: frame at which the body meets the ground.
-        rising: first frame of getting up.
-        way: index of the recording of getting up.
-        way_frames: (R,) fractional frames of that recording, from `rising` on.
+        recorded_count: recorded frames that are kept: all except a few after a jump of markers near the end.
+        touch_frame: frame at which the body meets the ground.
+        rise_frame: first frame of getting up.
+        get_up_index: index of the recording of getting up.
+        get_up_frames: (R,) fractional frames of that recording, from `rise_frame` on.
     """
 
     motion: Motion
@@ -82,7 +82,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
 
     Args:
         motion: ends in flight; the ground has height 0.
-        ways_up: recordings of the same skeleton from lying to standing, one or more, on the same ground.
+        get_up_motions: recordings of the same skeleton from lying to standing, one or more, on the same ground.
     Returns:
         The recording with its continuation.
     """
@@ -159,7 +159,7 @@ class _Fall:
 class _Track:
     """Local rotations (J, 4) in motion, with their angular velocity (J, 3) rad/s in their own frames and its change.
 
-    `towards` lets their offset from a goal fade.
+    `blend_toward` lets their offset from a goal fade.
     """
 
     def __init__(self, motion: Motion | None = None, pose=None, speed=None, acceleration=None):
@@ -298,7 +298,7 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
     Args:
         flight, settling: number of frames of each.
         up: recording of getting up.
-        shown: (R,) its fractional frames in the frames that are left.
+        frames_shown: (R,) its fractional frames in the frames that are left.
     """
     skeleton, body, fps = motion.skeleton, identify(motion.skeleton), motion.fps
     seconds = np.arange(1, len(rotations) + 1) / fps

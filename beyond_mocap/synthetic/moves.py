@@ -134,9 +134,9 @@ def standing_posture(neutral: Neutral, duration: float, fps: float, seed: int, w
         duration: s.
         fps: frames per second.
         seed: of the variation.
-        width: m by which the feet are wider apart than usual.
+        width: m added between the feet.
     Returns:
-        course: the plan.
+        gait_plan: the plan.
         steps: stances of both feet.
         posture: the posture.
     """
@@ -215,7 +215,7 @@ def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves)
     """Build the stances of one foot that stays in place except for some steps.
 
     Args:
-        course: the plan.
+        gait_plan: the plan.
         neutral: neutral stance of the body.
         side: 0 left, 1 right.
         key: s of the key moment.

@@ -77,7 +77,7 @@ def make_person(
 
 
 def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
-    """Build an adult whose limbs and trunk are some percent longer or shorter than usual, the same on both sides.
+    """Build an adult whose limbs and trunk are some percent longer or shorter than average, the same on both sides.
 
     Args:
         stature: m.
@@ -128,7 +128,7 @@ class KickManner:
     """How a performer kicks.
 
     Attributes:
-        approach: degrees that the run-up is turned more than usual.
+        approach: degrees added to the run-up's turn.
         stride: factor.
         back: factor on how far leg and pelvis swing back.
         follow: factor on how high the leg swings after the ball.
@@ -162,7 +162,7 @@ def vary_kick(who: Person, base: KickStyle, speed: float, chance: np.random.Gene
     """Vary how a performer kicks.
 
     Args:
-        who: the performer.
+        performer: the performer.
         base: style of the kick.
         speed: of the ball, m/s.
         chance: random generator, for the difference from kick to kick.
@@ -227,7 +227,7 @@ class ThrowManner:
     """How a performer throws.
 
     Attributes:
-        slot: degrees that the trunk leans away from the arm at release, more than usual.
+        slot: degrees added to the trunk's lean away from the arm at release.
         stride: factor.
         lift: factor, of the leading leg.
         wind_up: factor on the seconds before the foot is down.

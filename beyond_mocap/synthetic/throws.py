@@ -221,7 +221,7 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
 
 
 def _wanted_elevation(way: np.ndarray, speed: float) -> float:
-    """Compute the elevation (rad) of the flatter arc without air that covers `way` (3,) m.
+    """Compute the elevation (rad) of the flatter arc without air that covers `to_target` (3,) m.
 
     Raises:
         InputError: if there is none.

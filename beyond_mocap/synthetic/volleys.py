@@ -35,7 +35,7 @@ class Volley:
     """How a standing body strikes with its right side; seconds from the touch, metres of an adult, degrees.
 
     Attributes:
-        words: labels of the vocabulary.
+        labels: labels of the vocabulary.
         span: seconds in which the body differs from standing.
         hips: rows (time, ahead, left, lowered).
         pelvis: rows (time, list, tilt, turn).

@@ -75,7 +75,7 @@ class Rally:
     Attributes:
         start: scene frame of second 0.
         starts: (K,) s of the flights.
-        ways: (n, 3) m for each flight.
+        flight_paths: (n, 3) m for each flight.
         strike_times: (S,) s.
         strikes: (S, 3) m.
         bounces: (B, 3) m.
@@ -253,7 +253,7 @@ def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
 
     Args:
         scene: the scene.
-        made: anything with a `ball` and its `kind`.
+        played_scene: anything with a `ball` and its `kind`.
         start: scene frame of second 0.
     """
     settings, path = scene.beyond_mocap_passes, made.ball

@@ -66,7 +66,7 @@ def take(
         bone: the bone that carries the ball.
         first: first frame on which it is carried.
         last: frame on which it is released.
-        how: one of `setting.HOLDS`.
+        mode: one of `setting.HOLDS`.
         settle: frames in which it moves to its carried position.
         skin: m from the bone to the surface that touches the ball.
     Returns:
@@ -141,7 +141,7 @@ def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
     if own.before.kept:
         bring_back(own.before, ball, KEPT)
     write()
-    if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have called `anew` itself
+    if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have called this
         put_aside(own.before, ball)
         rebuild(scene, ball)
 

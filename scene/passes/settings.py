@@ -75,7 +75,7 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
                                description="Colour of the player's shirt")
     shown: PointerProperty(name="Shown On", type=bpy.types.Object, options={"HIDDEN"},
                            description="The armature that shows the scene now")
-    before: PointerProperty(type=BeyondMocapBefore, description="What the character played before the scene was made")
+    before: PointerProperty(type=BeyondMocapBefore, description="What the character played before the scene")
 
 
 @with_settings("passes.pass", update=touch_live)
@@ -163,7 +163,7 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
                            description="Ball of the scene; created if empty")
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before the scene was made")
     made_of: StringProperty(name="Made Of", options={"HIDDEN"},
-                            description="Digest of the settings that the shown scene was made from")
+                            description="Digest of the settings of the shown scene")
     told: StringProperty(name="Messages", options={"HIDDEN"}, description="Warnings and messages about the scene")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the shown scene")
     strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="One line for each strike: frame and text")

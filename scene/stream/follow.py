@@ -44,12 +44,12 @@ _on_look: list = []
 
 
 def on_hit(call) -> None:
-    """Call `call(scene, hit, seconds)` for every detected strike, until `forget`."""
+    """Call `call(scene, hit, seconds)` for every detected strike, until `remove_call`."""
     _on_hit.append(call)
 
 
 def on_look(call) -> None:
-    """Call `call(scene)` at every update, until `forget`."""
+    """Call `call(scene)` at every update, until `remove_call`."""
     _on_look.append(call)
 
 

@@ -58,9 +58,9 @@ class BvhStream:
     Attributes:
         rows: converts values to poses; None until there are a hierarchy and a frame.
         frame_time: s, if the stream gives it, otherwise None.
-        rubbish: number of invalid pieces that were skipped.
-        others: number of frames of other avatars.
-        told: what was wrong with the last invalid piece, one line.
+        invalid_count: number of invalid pieces that were skipped.
+        other_avatars: number of frames of other avatars.
+        last_error: what was wrong with the last invalid piece, one line.
     """
 
     def __init__(self, hierarchy: str | None = None, unit: float | None = None):

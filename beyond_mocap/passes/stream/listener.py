@@ -70,9 +70,9 @@ class Status:
             "failed", or "stopped".
         frames: total number of frames.
         rate: frames per second, recently.
-        quiet: s since the last frame.
-        way: median delay in s from sender to listener; None if the sender sends no times.
-        rubbish: number of invalid pieces.
+        idle: s since the last frame.
+        delay: median delay in s from sender to listener; None if the sender sends no times.
+        invalid_count: number of invalid pieces.
         line: one line for the user.
     """
 

@@ -29,12 +29,12 @@ class Sender:
     Args:
         path: the BVH file.
         port: port of this machine.
-        way: one of WAYS.
+        connection: one of WAYS.
         form: one of FORMS.
         rate: frames per second; None: the file's.
         loop: whether to repeat the file.
     Raises:
-        InputError: for an unknown way or form, a file that is no BVH file, or frames larger than a datagram.
+        InputError: for an unknown connection or form, a file that is no BVH file, or frames larger than a datagram.
     """
 
     def __init__(self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None,
@@ -55,7 +55,7 @@ class Sender:
 
         Args:
             stopped: whether to stop.
-            told: receives the number of frames sent, after each frame.
+            report: receives the number of frames sent, after each frame.
         Returns:
             The number of frames sent.
         Raises:

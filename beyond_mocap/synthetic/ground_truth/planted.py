@@ -19,10 +19,10 @@ from ...ball.physics import FOOTBALL, Ball, rolling_spin
 LENGTH, WIDTH = 105.0, 68.0
 TEAMS = ("home", "away")
 _ROWS = ((-47.0, (0.0,)), (-30.0, (-22.0, -8.0, 8.0, 22.0)), (-12.0, (-24.0, -8.0, 8.0, 24.0)), (4.0, (-10.0, 10.0)))
-_HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # m of the ball's centre: header above the first, chest above the second; none above the third
+_HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # m of the ball's centre: head above, chest above, most
 _HOLD = 9.0  # s over which a player leaves their place for a ball and returns
 _SLOW = 0.4  # s, correlation time of the ball's error
-_PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # players' errors: correlation time s, size m; m from sample to sample
+_PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # s, m; m from sample to sample
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -33,7 +33,7 @@ class PlantedTouch:
         time: s.
         player: id.
         part: "foot", "chest", "head" or "hand".
-        word: "kick", "receive", "dribble", "header" or "throw-in".
+        label: "kick", "receive", "dribble", "header" or "throw-in".
         position: (3,) m, the ball's centre.
         before: (3,) m/s, the ball's velocity before the touch.
         after: (3,) m/s, its velocity after the touch.
@@ -244,7 +244,7 @@ class _Play:
         return self._out()
 
     def _tried(self, other: int, way: np.ndarray) -> tuple[Flight, float] | None:
-        """Try a ball played `way` (2,) m to `other`; the flight and when they can take it, or None."""
+        """Try a ball played `to_target` (2,) m to `other`; the flight and when they can take it, or None."""
         far, angle = float(np.linalg.norm(way)), np.arctan2(way[1], way[0])
         across = way / far
         if self.rng.random() < min(0.25 + far / 60.0, 0.8):

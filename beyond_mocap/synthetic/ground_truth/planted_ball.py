@@ -30,8 +30,8 @@ class PlantedBall:
         release: s at which the ball leaves the hand.
         side: "Left" or "Right".
         radius: m.
-        turns: revolutions per second in flight.
-        seen: s of flight after which no camera sees it.
+        spin_rate: revolutions per second in flight.
+        seconds_seen: s of flight after which no camera sees it.
         drag: 1/m, see `ball.physics`.
         label: of the marker.
         grip: (3,) m, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
@@ -52,7 +52,7 @@ class BallTruth:
     """Ground truth of a synthetic ball, without noise.
 
     Attributes:
-        asked: the request.
+        request: the request.
         places: (T, 3) m, the ball's centre.
         marker: (T, 3) m, the marker.
         position: (3,) m, the centre at release.
@@ -80,7 +80,7 @@ def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
 
     Args:
         truth: the motion, as `to_marker_axes` gives it.
-        asked: the request.
+        request: the request.
     Returns:
         The ball's ground truth.
     Raises:

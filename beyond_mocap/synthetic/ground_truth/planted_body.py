@@ -89,7 +89,7 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
     Args:
         named: name -> old joint.
         places: (T, J, 3) m of the old joints, world.
-        turns: name -> (T, 4) world rotations.
+        rotations: name -> (T, 4) world rotations.
         leg: length of a leg, m.
     """
     names = list(named)

@@ -56,7 +56,7 @@ class Planted:
         static: static trial of the same body with the same markers.
         motion: the true motion, joints named and oriented as in marker models.
         centres: (T, J, 3) m, its joints, world.
-        pose: the true motion of the static trial.
+        static_motion: the true motion of the static trial.
         markers: places of the markers on the bones.
         clean: (T, M, 3) m, true places of the trial's markers: with skin and noise, without faults.
         faults: the faults of the trial.

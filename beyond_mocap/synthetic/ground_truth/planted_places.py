@@ -262,7 +262,7 @@ def markers_on(motion: Motion, placed: Placed) -> np.ndarray:
 
     Args:
         motion: the motion, T frames.
-        placed: M markers.
+        placement: M markers.
     Returns:
         (T, M, 3) m, world frame.
     """
@@ -275,7 +275,7 @@ def on_skin(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int, soft
 
     Args:
         motion: the motion, T frames.
-        placed: M markers.
+        placement: M markers.
         neutral: (J, 4) local rotations in which no skin is shifted.
         seed: of the directions of the shifts.
         softness: factor on all shifts; 0: bone.
