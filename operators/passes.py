@@ -46,6 +46,7 @@ class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
         return f"Move the active {one} {moved}" if moved else f"Remove the active {one}"
 
     def do(self, context):
+        """Change the list."""
         settings = context.scene.beyond_mocap_passes
         if self.what == "ADD":
             return add_player(context) if self.rows == "players" else add_pass(settings)
@@ -93,6 +94,7 @@ def add_player(context) -> None:
         row = order.add_player(context, order.free_name(settings) if taken else body.name, place, facing)
         row.body = body
         return
+    # the first three players on a triangle, more on a ring twice as wide
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units

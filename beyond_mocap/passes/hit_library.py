@@ -139,6 +139,7 @@ class HitLibrary:
         Source: Ball handling, section 4, eq. 2.
         """
         size, speed, vectors, times = self._arrays
+        # scale from the example's body to the library's, by leg length
         grown = size / max(example.size, 1e-6)
         distance = weights.speed * np.abs(speed - grown * example.max_speed)
         away = vectors - grown[:, None, None] * example.vectors
@@ -162,9 +163,11 @@ class HitLibrary:
         """
         edges = (0.0, *_bounds(self.part), np.inf)
         low, high = edges[KINDS.index(kind)], edges[KINDS.index(kind) + 1]
+        # m/s by which each hit misses the kind's speed range
         outside = np.maximum(low - self.speeds, 0.0) + np.maximum(self.speeds - high, 0.0)
         unnamed = np.array([not one.labelled for one in self.hits], dtype=bool)
         typical = np.abs(self.speeds - 0.5 * (low + high)) if np.isfinite(high) else -self.speeds
+        # last key first: range, then labels, then typical speed, then the order of clips
         order = np.lexsort((np.arange(len(self)), typical, unnamed, outside))
         return order if side is None else order[self.sides[order] == side]
 

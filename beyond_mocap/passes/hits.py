@@ -342,6 +342,7 @@ def _threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
     # Otsu: for each cut of the sorted peaks, the means on both sides and the variance between them
     before = np.cumsum(tops)[:-1] / np.arange(1, len(tops))
     after = (tops.sum() - np.cumsum(tops)[:-1]) / np.arange(len(tops) - 1, 0, -1)
+    # between-class variance, without its constant factor
     spread = np.arange(1, len(tops)) * np.arange(len(tops) - 1, 0, -1) * (after - before) ** 2
     cut = int(np.argmax(spread))
     return max(least, float(0.5 * (tops[cut] + tops[cut + 1])))
@@ -356,6 +357,7 @@ def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
             continue
         first = _lowest(speed, high, [low for low in reversed(lows) if low < high])
         last = _lowest(speed, high, [low for low in lows if low > high])
+        # the hit motion before it ends here at the latest
         if spans and first < spans[-1][1]:
             first = spans[-1][1]
         spans.append((first, last))

@@ -66,6 +66,7 @@ def aligned(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
     velocity = (after[0] - before[0]) * (motion.fps / np.maximum(taken, 1e-9))[:, None, None]
     places, facing = here
+    # remove the heading and the root's place on the ground
     turn = quaternion.about_up(-facing)[:, None]
     return quaternion.rotate(turn, places - places[:, :1] * [1.0, 1.0, 0.0]), quaternion.rotate(turn, velocity)
 

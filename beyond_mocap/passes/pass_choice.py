@@ -190,6 +190,7 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
     """
     seconds = seconds_of(court.passes[number], court.scene.fps)
     tried = _tried(court, number, options, after=after, option=np.zeros(len(seconds), int), seconds=seconds)
+    # without any possible flight all times are tried with the other options
     best = np.argsort(tried.cost, kind="stable")[:MOST_TIMES] if np.isfinite(tried.cost).any() else slice(None)
     others = np.arange(1, len(options.cost))
     tried = tried.and_also(_tried(court, number, options, after, *_each(others, seconds[best])))
@@ -197,6 +198,7 @@ def _linked(court: Court, number: int, options: _Options, after: Link) -> Link:
         raise _refusal(court, number, tried)
     best = int(np.argmin(tried.cost))
     option = int(tried.option[best])
+    # the natural trajectory that starts nearest to the chosen flight, for display
     chosen = int(np.argmin(np.linalg.norm(options.natural.starts - tried.starts[best], axis=1)))
     return Link(moment=options.moments.only([option]), facing=float(options.facing[option]),
                 seconds=float(tried.seconds[best]), velocity=tried.velocity[best],
@@ -224,6 +226,7 @@ def _tried(court: Court, number: int, options: _Options, after: Link, option: np
     cost += pass_court.against_the_part(arriving, after.velocity, _pushes(receiver, after))
     cost += pass_court.rising(arriving) + pass_court.lasting(seconds, site.kind)
     good = aimed.possible & (aimed.miss <= pass_court.ON_TARGET)
+    # impossible flights, and those that hit the net, cost infinitely much
     cost = np.where(good & court.clear(ways), cost, np.inf)
     return _Tried(option=option, starts=starts, target=target, seconds=seconds, velocity=aimed.velocity, cost=cost,
                   reached=bool(good.any()))
@@ -256,9 +259,10 @@ def _refusal(court: Court, number: int, tried: _Tried) -> InputError:
 
 
 def _best(cost: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Find the indices of the lowest costs: MOST_OPTIONS at most, and MOST_OF_A_HIT of one hit motion."""
+    """Find the indices of the lowest costs: MOST_OPTIONS at most, and MOST_PER_HIT of one hit motion."""
     kept: list[int] = []
     of_hit: dict[int, int] = {}
+    # cheapest first; each hit motion at most MOST_PER_HIT times, so that the options differ
     for index in np.argsort(cost, kind="stable"):
         if of_hit.get(int(which[index]), 0) < MOST_OF_A_HIT:
             kept.append(int(index))

@@ -37,7 +37,7 @@ Struck from below it spins back; struck hard it spins forward.
 """
 LONG = {"toss": 1.5, "pass": 1.5, "attack": 0.9}  # s
 PER_SECOND = 2.0
-"""m/s of cost for each second of travel beyond LONG."""
+"""m/s of cost for each second of travel beyond LONG_TRAVEL."""
 RISES = {"toss": (0.7, 0.95), "pass": (0.4, 0.8), "attack": (-0.4, 0.3)}
 """Sines of the lowest and highest launch angle above the ground of each kind of pass."""
 BEHIND, PER_RADIAN = np.radians(100.0), 2.0
@@ -387,7 +387,7 @@ def arrivals(starts: np.ndarray, velocities: np.ndarray, spin: np.ndarray | None
         seconds: (N,) s of travel.
         ball: the ball.
     Returns:
-        (N, 3) m/s, A_MOMENT before arrival.
+        (N, 3) m/s, ARRIVAL_STEP before arrival.
     """
     return after(launched(starts, velocities, spin, ball), ball, seconds - A_MOMENT).velocity
 
@@ -403,6 +403,7 @@ def against_the_part(arriving: np.ndarray, leaving: np.ndarray, part: np.ndarray
         (N,) m/s.
     """
     push = leaving - arriving
+    # cosine of the angle between the ball's change of velocity and the part's movement
     along = push @ part / np.maximum(np.linalg.norm(push, axis=1) * np.linalg.norm(part), 1e-9)
     return PUSHED * (1.0 - along)
 
@@ -436,5 +437,6 @@ def clears_net(ways: np.ndarray, radius: float, net: Net) -> np.ndarray:
     at = ways[:, :-1] + np.clip(share, 0.0, 1.0)[..., None] * (ways[:, 1:] - ways[:, :-1])
     on = ((at[..., :2] - start) @ along) / (along @ along)
     width = radius / np.linalg.norm(along)
+    # the net ends half a ball's width beyond its posts, and is a ball's radius higher
     hit = crosses & (on > -width) & (on < 1.0 + width) & (at[..., 2] < net.height + radius)
     return ~hit.any(axis=1)

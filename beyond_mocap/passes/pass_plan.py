@@ -118,6 +118,7 @@ def _longer(court: Court, chain: list[Link], which: Iterable[int], lack: float, 
         frames = int(np.ceil(lack * fps / (len(free) - done) - 1e-6))
         if frames <= 0:
             break
+        # longest first, so that the first possible one takes the largest share of the missing time
         tried = chain[number].seconds + np.arange(frames, 0, -max(frames // LONGER, 1)) / fps
         aimed, good = court.flown(number, np.tile(places[number], (len(tried), 1)), places[number + 1], tried)
         if good.any():
@@ -244,6 +245,7 @@ def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) ->
             court.sites, orders, flown.arriving, flown.leaving, flown.spin, chain
         )
     ]
+    # what happens to the ball after the last strike
     limp = _limp(outcome, chain[-1], flown.arriving[-1])
     last = Strike(player=court.sites[-1].player, order=orders[-1], velocity_in=flown.arriving[-1], velocity_out=limp,
                   spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
@@ -334,6 +336,7 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
         flown: their flights.
     """
     serving = 0.0 if court.scene.serve == GROUND else min(first, LONGEST_SERVE)  # it starts as the scene begins
+    # ball places follow from flights, flights from places; this converges in a few rounds
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
         _, arriving = _arriving(court, chain, places, begun=(first, serving), leaving=leaving, spin=spin)
@@ -372,6 +375,7 @@ def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarra
         near = np.array([chain[number].velocity for number in same])
         aimed = aim(places[same], targets[same], court.ball, seconds=seconds[same], bounces=int(count), spin=spin[same],
                     near=near)
+        # a jump of the launch velocity means another trajectory: keep the old one until the last round
         other = (np.linalg.norm(aimed.velocity - near, axis=1) > LEAP) & (not last)
         velocities[same] = np.where(other[:, None], near, aimed.velocity)
         missed[same] = np.where(other, np.inf, aimed.miss)

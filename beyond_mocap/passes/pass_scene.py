@@ -258,6 +258,7 @@ def _said(value) -> str:
 
 
 def _check_players(players: tuple[Player, ...]) -> None:
+    """Check number, names, places, parts, tools and heights of the players."""
     if not 2 <= len(players) <= MOST_PLAYERS:
         raise InputError("players", f"{len(players)} players", f"2 to {MOST_PLAYERS}")
     for number, one in enumerate(players):
@@ -305,6 +306,7 @@ def _check_part(part: str, side: str, where: str) -> None:
 
 
 def _check_passes(scene: PassScene) -> None:
+    """Check the passes, and that each starts where the one before ended."""
     if not scene.passes:
         raise InputError("passes", "none", "at least one")
     number_within(scene.repeat, "repeat", "repeat", whole=True)
@@ -325,6 +327,7 @@ def _check_passes(scene: PassScene) -> None:
 
 
 def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:
+    """Check one pass: players, kind, error, numbers, example and distance."""
     for word, name in (("from", one.giver), ("to", one.receiver)):
         if name not in names:
             raise InputError(where, f"{word} {name!r}", f"one of {', '.join(names)}")
@@ -362,6 +365,7 @@ def _check_meetings(scene: PassScene) -> None:
 
 
 def _check_numbers(scene: PassScene) -> None:
+    """Check the numbers, weights, net and serve of a scene."""
     for name in ("fps", "transition", "lead_in", "lead_out"):
         number_within(getattr(scene, name), name, name)
     number_within(scene.seed, "seed", "seed", whole=True)
@@ -394,6 +398,7 @@ def _check_net(net: Net) -> None:
 
 
 def _check_serve(scene: PassScene) -> None:
+    """Check the serve: a known other player, or a place away from the first player."""
     serve = scene.serve
     if serve is None or serve == GROUND:
         return

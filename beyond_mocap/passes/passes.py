@@ -138,6 +138,7 @@ def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
 def _part_of(report, number: int, players: tuple[Player, ...]):
     """Build the progress callback of one player's motion within the whole work."""
     def told(share: float, text: str) -> None:
+        """Report the share of this player's work."""
         report(PLANNED + (1.0 - PLANNED) * (number + share) / len(players), f"{players[number].name}: {text}")
 
     return told
@@ -319,13 +320,14 @@ class _Reach:
             raise InputError("example", found, f"a time up to {motion.duration:.2f} s")
         found = strongest(motion.frames(first, min(last, len(motion))), part, side, tool)
         if found is None:
-            raise InputError("example", f"no {part} strike there in {example.clip}", "a stretch with a whole strike")
+            raise InputError("example", f"no strike by {part} there in {example.clip}", "a stretch with a whole strike")
         return found
 
 
 def _needs(library: Library, sizes: dict[str, float]):
     """Build the function that gives the seconds a player needs; a larger body moves as the library does, scaled."""
     def need(player: str, before: Stance | HitOrder, after: HitOrder) -> float:
+        """Seconds that a player needs from one strike, or from standing, to the next."""
         return least_seconds(library, _sized(before, sizes[player]), _sized(after, sizes[player]))
 
     return need

@@ -130,6 +130,7 @@ def scene_dict(scene: PassScene) -> dict:
 
 
 def _player_out(one: Player) -> dict:
+    """Build the JSON object of a player, without default values."""
     out: dict = {"name": one.name, "place": list(one.place)}
     if one.facing is not None:
         out["facing"] = _in_degrees(one.facing)
@@ -142,6 +143,7 @@ def _player_out(one: Player) -> dict:
 
 
 def _pass_out(one: Pass) -> dict:
+    """Build the JSON object of a pass, without default values."""
     out: dict = {"from": one.giver, "to": one.receiver}
     for name in _OF_PASS:
         value = getattr(one, name)
@@ -211,6 +213,7 @@ def _tool(value, where: str) -> Tool:
 
 
 def _ball(value, where: str) -> BallChoice:
+    """Parse the ball: a kind, or an object with a kind and values that differ from it."""
     if isinstance(value, str):
         return BallChoice(value)
     check_object(value, where)
@@ -229,15 +232,18 @@ def _net(value, where: str) -> Net:
 
 
 def _serve(value, where: str):
+    """Parse the serve: a position, or a name or "ground"."""
     return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
 
 
 def _errors(value, where: str) -> dict[str, Any]:
+    """Parse the probabilities of errors."""
     check_names(value, where, ("missed", "dropped"), ())
     return {name: number(one, f"{where}: {name}") for name, one in value.items()}
 
 
 def _weights(value, where: str) -> Weights:
+    """Parse the weights of eq. 1 and eq. 2."""
     names = [entry.name for entry in fields(Weights)]
     check_names(value, where, names, ())
     bones = value.get("bones", {})
@@ -258,6 +264,7 @@ def _list_of(read: Callable) -> Callable:
 
 
 def _angle(value, where: str) -> float:
+    """Parse an angle in degrees to rad; larger angles are reduced to half a turn."""
     degrees = number(value, where)
     return math.radians(degrees if abs(degrees) <= 360.0 else math.remainder(degrees, 360.0))
 
@@ -293,6 +300,7 @@ def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
 
 
 def _cell(value) -> str:
+    """Format a value as a CSV cell: 0/1 for bools, six digits for numbers, empty for None and NaN."""
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):

@@ -81,6 +81,7 @@ class Choice:
         Returns:
             The hit motions, best first.
         """
+        # labels first: other parts' strikes and other acts are out
         found = self._called([i for i, one in enumerate(self.hits) if not side or one.hit.side in ("", side)])
         stops = [i for i in found if self.words[i] & RECEIVE_WORDS]
         if kind == RECEIVE:
@@ -111,7 +112,7 @@ def unsaid(library: Library, order: HitOrder) -> bool:
 
 
 def _rank(part: str, words: frozenset[str]) -> int:
-    """Rank labels for a part: _SAID, _SILENT or _OTHER."""
+    """Rank labels for a part: _NAMED, _UNNAMED or _OTHER."""
     said = _said_part(words)
     if words & OTHER_ACTS or (said not in (None, part) and part in FASTEST):
         return _OTHER
@@ -181,6 +182,7 @@ class StrikeMoments:
         along = self.struck.end - self.struck.start
         long = np.linalg.norm(along, axis=-1, keepdims=True)
         along = along / np.maximum(long, 1e-9)
+        # cosine with the limb's direction: negative where the normal points back along the limb
         back = np.sum(normal * along, axis=-1, keepdims=True)
         spare = np.where(long > 1e-6, np.minimum(back + _BACK_ON_LIMB, 0.0), 0.0)
         out = normal - spare * along
@@ -204,6 +206,7 @@ def strike_moments(library: Library, hits: Sequence[LibraryHit], tool: Tool | No
         motion, hit = library.clips[one.clip].recording, one.hit
         surface = striking_surface(motion.skeleton, hit.part, hit.side, tool)
         first, last = hit.ball_stretch
+        # whole frames spread over the ball stretch
         own = np.unique(np.round(np.linspace(first, last, MOST_FRAMES)))
         gone = motion.root_positions[[hit.first, hit.last], :2]
         which.append(np.full(len(own), number))

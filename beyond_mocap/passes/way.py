@@ -167,9 +167,9 @@ class Placed:
         return (ends[1] - ends[0]) / (2.0 * step)
 
     def lead(self, way: int) -> float:
-        """Measure the recorded run-up or run-out, at most LEAD seconds.
+        """Measure the recorded run-up or run-out, at most LONGEST_LEAD seconds.
 
-        It reaches to where the body is at rest, or nearest to rest; each second of it is worth TIMELY m/s.
+        It reaches to where the body is at rest, or nearest to rest; each second of it is worth LEAD_WORTH m/s.
 
         Args:
             direction: -1 for the run-up, 1 for the run-out.
@@ -215,7 +215,7 @@ class Placed:
 def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[Placed]:
     """Place the hit motions of one player with run-up and run-out.
 
-    Neighbours do not overlap: run-out and run-up take at most _SHARE of the time between two hit motions.
+    Neighbours do not overlap: run-out and run-up take at most _LEAD_SHARE of the time between two hit motions.
 
     Args:
         library: the library.

@@ -120,7 +120,7 @@ def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int)
     """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
-    # toes down: the foot turns about its ball and, beyond _TOE_LIFTS, about the toe tip
+    # toes down: the foot turns about its ball and, beyond _TOE_LIFT_PITCH, about the toe tip
     tip = neutral.tip
     lifted_ahead = ball_ahead + tip * (1.0 - np.cos(tip_pitch))
     lifted_up = ball_up + tip * np.sin(tip_pitch)

@@ -255,7 +255,7 @@ def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
 
 
 def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple]:
-    """Build rows (time, ahead, left, raised, pitch, yaw) of left and right foot; from _FREE on the right one follows
+    """Build rows (time, ahead, left, raised, pitch, yaw) of left and right foot; from _SWING_START on the right one follows
     the leg.
     """
     yaw = -style.approach

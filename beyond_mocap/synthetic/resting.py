@@ -66,7 +66,7 @@ def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarra
         along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
         above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
         thick = np.array([t for _, t in points])[:, None]
-        # height of each point of the arm for each angle in _RAISED: (T, points, angles)
+        # height of each point of the arm for each angle in _ARM_ANGLES: (T, points, angles)
         raised = above * np.cos(_RAISED) + along * np.sin(_RAISED) - thick + shoulder[:, 2, None, None]
         angle = _RAISED[_first_enough(raised.min(axis=1))]
         axis = np.stack([level[:, 1], -level[:, 0], np.zeros(len(level))], axis=1)

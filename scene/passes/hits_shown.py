@@ -208,10 +208,12 @@ def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
     """Draw a curve two pixels wide through heights (N,) px, spread over the picture's width."""
     columns = np.arange(_EDGE, SIZE - _EDGE)
     line = np.interp(columns, np.linspace(_EDGE, SIZE - 1 - _EDGE, len(heights)), heights)
+    # each column covers the curve from half-way to its left neighbour to half-way to its right one
     before, after = np.r_[line[:1], line[:-1]], np.r_[line[1:], line[-1:]]
     low = np.minimum(line, np.minimum(0.5 * (line + before), 0.5 * (line + after))) - 1.0
     high = np.maximum(line, np.maximum(0.5 * (line + before), 0.5 * (line + after))) + 1.0
     rows = np.arange(SIZE)[:, None]
+    # share of each pixel that the curve covers, for antialiasing
     cover = np.clip(np.minimum(rows + 0.5 - low, high - rows + 0.5), 0.0, 1.0)[..., None]
     image[:, _EDGE : SIZE - _EDGE, :3] += cover * (np.array(colour) - image[:, _EDGE : SIZE - _EDGE, :3])
 

@@ -51,6 +51,7 @@ def settle(scene: bpy.types.Scene) -> bool:
     digest = edited(scene)
     if not digest:
         make.show_dragged(None)
+    # each request starts once, also if it fails or is cancelled
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
         if bpy.ops.beyond_mocap.passes_make.poll():
@@ -70,6 +71,7 @@ def _drag(scene) -> None:
         if not _running[0].poll():
             return
         job = _running.pop()
+        # None: the job was cancelled or failed
         if job.result is not None:
             make.show_dragged(job.result)
             window.redraw()

@@ -267,6 +267,7 @@ def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
         put_aside(settings.ball_before, target)
 
     def write() -> None:
+        """Write the path to the ball's action."""
         channels.discard(target, KEPT)
         first = start + float(path.times[0]) * frames_per_second(scene)
         ball.write(target, path, scene, first)[KEPT] = True
@@ -334,7 +335,9 @@ def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
 
 
 def _candidates(strike, ball: "Ball") -> np.ndarray:
-    """Compute the trajectories (M, T, 3) m that the ball could have taken from a strike (Fig. 6, black)."""
+    """Compute the trajectories (M, T, 3) m that the ball could have taken from a strike (Fig. 6, black), MOST_CANDIDATES at
+    most.
+    """
     from ...beyond_mocap.ball.batch import courses
 
     natural = strike.natural

@@ -137,6 +137,7 @@ def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float
 
 
 def _player(scene, row: BeyondMocapPasser) -> Player:
+    """Build a player from a row."""
     if row.place is None or row.place.name not in scene.objects:
         raise InputError(f"player {row.name}", "no place", "an object that marks where the player stands",
                          "choose one as Place")
@@ -162,6 +163,7 @@ def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
 
 
 def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
+    """Build a pass from a row."""
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
     return Pass(row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
@@ -176,11 +178,17 @@ def _rate(scene) -> float:
 
 
 def _serve(settings):
+    """Build the serve from the settings."""
     place = tuple(_exact(value) for value in settings.serve_at)
     return {"USUAL": None, "GROUND": GROUND, "PLAYER": settings.serve, "PLACE": place}[settings.serve_from]
 
 
 def _weights(row) -> Weights:
+    """Parse the weights of the panel, with those of single bones.
+
+    Raises:
+        InputError: if the bone weights cannot be read.
+    """
     bones = {}
     for item in filter(str.strip, row.bones.replace("=", " ").split(",")):
         name, _, number = item.strip().rpartition(" ")
@@ -194,6 +202,7 @@ def _weights(row) -> Weights:
 
 
 def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
+    """Set a row from a player; a part that is no known one is a joint's name."""
     known = {"foot", "head", "chest", "hand", "tool"}
     row.part, row.bone = (player.part, "") if player.part in known else ("foot", player.part)
     row.side, row.height = player.side or "either", player.height
@@ -202,6 +211,7 @@ def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
 
 
 def _fill_pass(context, row, one: Pass) -> None:
+    """Set a row from a pass."""
     row.who, row.to, row.kind = one.giver, one.receiver, one.kind
     row.bounces, row.error = one.bounces, one.error or "none"
     row.part, row.seconds = one.part or "own", one.seconds or 0.0
@@ -213,6 +223,7 @@ def _fill_pass(context, row, one: Pass) -> None:
 
 
 def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
+    """Set ball, net, serve and numbers of the settings from a passing scene."""
     settings.ball, settings.own = wanted.ball.kind, bool(wanted.ball.changes)
     for name, value in wanted.ball.changes.items():
         if name in NUMBERS:
@@ -238,6 +249,7 @@ def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
 
 
 def _empty(context, name: str, place, facing: float, colour) -> bpy.types.Object:
+    """Create an Empty that marks a place (m) and heading (rad)."""
     units = units_per_metre(context.scene)
     thing = bpy.data.objects.new(name, None)
     thing.empty_display_type, thing.empty_display_size, thing.show_name = "ARROWS", SIZE * units, True

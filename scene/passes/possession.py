@@ -125,9 +125,11 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
         bones = _bones(scene, hold)
         seen = _carried(scene, hold, bones, start=own[a],
                         end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
+        # the constraint's inverse is that of the bone on the first frame, so there is no jump there
         inverse = bones[0]
         ball.constraints[hold.name].inverse_matrix = inverse.inverted()
         lets_go.append((hold, inverse @ seen[-1]))
+        # no path of its own after this stretch
         if ends is None or ends[1] <= hold.last:  # it stays where it was released
             own[b:] = [bones[-1] @ seen[-1]] * (len(own) - b)
         own[a:b] = [inverse @ place for place in seen[:-1]]
@@ -208,6 +210,7 @@ def check_unaimed(ball: bpy.types.Object) -> None:
 
 
 def _check(ball, body, bone: str, first: int, last: int) -> None:
+    """Check that a bone can carry the ball on these frames."""
     channels.check_local(ball)
     channels.check_free(ball)
     check_unaimed(ball)
@@ -230,6 +233,7 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
 
 
 def _holds(ball, hold) -> bool:
+    """Whether a stretch still has its armature, bone and constraint."""
     return hold.body is not None and hold.bone in hold.body.pose.bones and hold.name in ball.constraints
 
 
@@ -256,6 +260,7 @@ def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None
     ends = held if end is None else bones[-1].inverted() @ end
     count = len(bones) - 1
     way = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
+    # frames that the ball needs at FASTEST for the longer one of both movements
     least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
     settle, found = 0, []
     if hold.how != "KEEP" or end is not None:
@@ -303,6 +308,7 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
     curves = {"location": ("Object Transforms", np.array([place.to_translation() for _, place in rows])),
               path: ("Object Transforms", _turns(mode, [place.to_quaternion() for _, place in rows]))}
     for hold, _ in lets_go:
+        # influence 1 from the first frame to just before the release
         held = (at >= hold.first) & (at < hold.last)
         influence = f'constraints["{bpy.utils.escape_identifier(hold.name)}"].influence'
         curves[influence] = ("Possession", held[:, None].astype(float))
@@ -311,6 +317,7 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
     made[KEPT] = True
     ends = np.isin(at, [hold.last - JUST_BEFORE for hold, _ in lets_go])
     for (name, _), curve in channels.curves(made, ball.animation_data.action_slot).items():
+        # keys of the influence, and those just before a release, hold their value until the next key
         still = np.ones(len(at), bool) if name.endswith("influence") else ends
         curve.keyframe_points.foreach_set("interpolation", np.where(still, CONSTANT, channels.LINEAR).astype(np.int32))
         curve.update()

@@ -121,11 +121,13 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     possession.check_unaimed(target)
     clock, (start, end) = scene_clock(scene), (float(solved.times[0]), float(solved.times[-1]))
     frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    # seconds of the scene's frames on the track's clock
     times = clock.start_time + (frames - clock.start_frame) / frames_per_second(scene)
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
     target[KEPT] = BALL  # marks it, whatever its name is
 
     def lay() -> None:
+        """Write the path to the ball's action."""
         channels.discard(target, KEPT)
         ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))[KEPT] = True
 

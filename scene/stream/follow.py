@@ -110,6 +110,7 @@ def _show(scene, listener: Listener, latest) -> str:
             return ""
         _state["bodies"] += 1
         settings.body = create_body(bpy.context, Motion(skeleton, root, rotations, 60.0))
+        # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
             bpy.ops.ed.undo_push(message="Streamed Character")
         made = "made"
@@ -159,6 +160,7 @@ def _give_up(why: str) -> None:
 
 
 def _tick() -> float:
+    """Update the stream, and return the seconds until the next call."""
     if current_listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             tell()
@@ -249,9 +251,11 @@ def pose_body(
         local: (J, 4) local rotations.
     """
     lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
+    # the object's rotation about the vertical turns the streamed motion with it
     turn = quaternion.about_up(quaternion.yaw(lie.rotation))
     root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)
     local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), quaternion.multiply(turn, local[0]))
+    # pose rotations are relative to the bones' rest rotations
     turned = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
     bones = thing.pose.bones
     every = np.empty((len(bones), 4), np.float32)

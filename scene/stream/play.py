@@ -155,6 +155,7 @@ def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> Piece:
 
 def _order(scene, hit: HitMotion) -> tuple:
     """Collect what a pass needs: library, rally, time, hit, receiver, bounces."""
+    # not before the holder can act
     now = max(seconds(scene), rally().free)
     return _held["library"], rally(), now, hit, target(scene), scene.beyond_mocap_stream.bounces
 
@@ -191,6 +192,7 @@ def _lay(scene, one: Rally, names: list[str]) -> None:
     """Apply a rally's motions and ball to the named players."""
     from ...beyond_mocap.passes.passes import ball_of
 
+    # players may have been renamed or removed since the rally started
     rows = {row.name: row for row in scene.beyond_mocap_passes.players}
     if missing := [name for name in names if name not in rows]:
         raise InputError("players", f"{missing[0]} is not in the list now", "the same players", "press Play Live again")
@@ -211,6 +213,7 @@ def _chosen(scene) -> None:
         return
     _held["seen"] = name
     for row in scene.beyond_mocap_passes.players:
+        # a player is clicked by character, mesh or place
         known = {row.body, row.place, *(row.body.children if row.body else ())}
         if active is not None and active in known and row.name != rally().holder:
             scene.beyond_mocap_stream.target = row.name

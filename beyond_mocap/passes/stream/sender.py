@@ -29,7 +29,7 @@ class Sender:
     Args:
         path: the BVH file.
         port: port of this machine.
-        connection: one of WAYS.
+        connection: one of CONNECTIONS.
         form: one of FORMS.
         rate: frames per second; None: the file's.
         loop: whether to repeat the file.

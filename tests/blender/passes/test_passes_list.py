@@ -114,9 +114,9 @@ def test_each_is_one_step_of_undo():
 def test_what_cannot_be_is_told(room, core):
     press(bpy.ops.beyond_mocap.passes_sample, sample="three")
     settings().passes[0].to = settings().passes[0].who
-    with pytest.raises(core("base.errors").InputError, match="himself"):
+    with pytest.raises(core("base.errors").InputError, match="both passer and receiver"):
         asked(room)
-    with pytest.raises(RuntimeError, match="himself"):
+    with pytest.raises(RuntimeError, match="both passer and receiver"):
         press(bpy.ops.beyond_mocap.passes_to_json, filepath="/nowhere/out.json")
     settings().passes[0].to = "Ben"
     bpy.data.objects.remove(bpy.data.objects["Cho place"])
