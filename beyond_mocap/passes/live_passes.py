@@ -239,7 +239,7 @@ def _rolled(path: BallPath, lies: np.ndarray, strike: float) -> np.ndarray:
 
 
 def _lasting(motion: Motion) -> Motion:
-    """Extend a motion that ends standing to STANDING_SECONDS seconds by playing its last seconds forth and back."""
+    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forth and back."""
     count = len(motion)
     sway = min(int(_SWAY * motion.fps), count - 1)
     # a triangle wave over the last `sway` frames
@@ -249,7 +249,7 @@ def _lasting(motion: Motion) -> Motion:
 
 
 def _going_on(before: Played, motion: Motion, at: float) -> Played:
-    """Continue a player's motion with `motion` from `at` s on, blended over the first BLEND_SECONDS seconds."""
+    """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS."""
     root, rotations = _faded(before, motion, at)
     past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)
     root = np.concatenate([before.motion.root_positions[past], root])
@@ -271,7 +271,7 @@ def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.nd
 
 
 def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:
-    """Join the ball's path so far with `path` from `at` s on, then let it lie for STANDING_SECONDS seconds."""
+    """Join the ball's path so far with `path` from `at` s on, then let it lie for STANDING_SECONDS."""
     step = path.times[1] - path.times[0]
     more = int(round(LONG / step))
     times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, more + 1)]) + at

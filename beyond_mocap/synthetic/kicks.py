@@ -255,8 +255,9 @@ def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
 
 
 def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple]:
-    """Build rows (time, ahead, left, raised, pitch, yaw) of left and right foot; from _SWING_START on the right one follows
-    the leg.
+    """Build rows (time, ahead, left, raised, pitch, yaw) of both feet.
+
+    From _SWING_START on, the right foot follows the leg.
     """
     yaw = -style.approach
     one, two, three = _STEPS

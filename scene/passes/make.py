@@ -335,8 +335,9 @@ def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
 
 
 def _candidates(strike, ball: "Ball") -> np.ndarray:
-    """Compute the trajectories (M, T, 3) m that the ball could have taken from a strike (Fig. 6, black), MOST_CANDIDATES at
-    most.
+    """Compute the trajectories (M, T, 3) m that the ball could have taken from a strike (Fig. 6, black).
+
+    M is MOST_CANDIDATES at most.
     """
     from ...beyond_mocap.ball.batch import courses
 
