@@ -266,7 +266,7 @@ def cost_of_moments(moments: StrikeMoments, facing: np.ndarray, whence: np.ndarr
     Args:
         moments: N moments.
         facing: (N,) rad, headings.
-        origin: (2,) m, vector to where the ball comes from.
+        to_origin: (2,) m, vector to where the ball comes from.
     Returns:
         (N,) m/s.
     """
