@@ -1,4 +1,4 @@
-"""Passing scenes: their lists, their files, and the making of them."""
+"""Passing scenes: their lists, their files, and their generation."""
 
 from __future__ import annotations
 
@@ -17,49 +17,49 @@ from ..scene.passes import hits_shown, make, order, shown
 from ..scene.passes.settings import SAMPLES
 from .verb import BackgroundVerb, ImportVerb, Verb
 
-ROWS = (("players", "Players", "Who keeps the ball going"), ("passes", "Passes", "One after the other"))
-WHAT = (("ADD", "Add", "One more at the end"), ("REMOVE", "Remove", "The picked one"),
-        ("UP", "Up", "The picked one earlier"), ("DOWN", "Down", "The picked one later"))
+ROWS = (("players", "Players", "Players of the scene"), ("passes", "Passes", "Passes in their order"))
+WHAT = (("ADD", "Add", "Add a row at the end"), ("REMOVE", "Remove", "Remove the active row"),
+        ("UP", "Up", "Move the active row up"), ("DOWN", "Down", "Move the active row down"))
 ACTIVE = {"players": "active_player", "passes": "active_pass"}
 RING = 3.0  # metres from the 3D cursor at which players are added
 
 
 class BEYOND_MOCAP_OT_passes_list(Verb, bpy.types.Operator):
-    """Add, remove or move a player or a pass. A new player stands near the 3D cursor, or where the selected armature
-stands, which becomes his body"""
+    """Add, remove or move a player or a pass"""
 
     bl_idname = "beyond_mocap.passes_list"
     bl_label = "Players and Passes"
-    rows: EnumProperty(name="List", items=ROWS, options={"SKIP_SAVE"}, description="Which list")
-    what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="What to do")
+    rows: EnumProperty(name="List", items=ROWS, options={"SKIP_SAVE"}, description="List to change")
+    what: EnumProperty(name="What", items=WHAT, options={"SKIP_SAVE"}, description="Change to make")
 
     @classmethod
     def description(cls, _context, properties):
         one = {"players": "player", "passes": "pass"}[properties.rows]
         if properties.what == "ADD" and one == "player":
             return (
-                "Add a player near the 3D cursor; a selected armature that is nobody's yet becomes his body, and he "
-                "stands where it does"
+                "Add a player near the 3D cursor, or with the selected armature as body if no other player uses it, "
+                "at its place"
             )
         if properties.what == "ADD":
-            return "Add a pass, from whoever gets the last one"
+            return "Add a pass from the receiver of the last one"
         moved = {"UP": "earlier", "DOWN": "later"}.get(properties.what)
-        return f"Move the picked {one} {moved}" if moved else f"Remove the picked {one}"
+        return f"Move the active {one} {moved}" if moved else f"Remove the active {one}"
 
     def do(self, context):
+        """Change the list."""
         settings = context.scene.beyond_mocap_passes
         if self.what == "ADD":
             return add_player(context) if self.rows == "players" else add_pass(settings)
         rows, number = getattr(settings, self.rows), getattr(settings, ACTIVE[self.rows])
         if not 0 <= number < len(rows):
-            raise InputError(self.rows, "none is picked", "a row of the list", "add one first")
+            raise InputError(self.rows, "no active row", "a row of the list", "add one first")
         if self.what == "REMOVE":
             self.remove(settings, rows, number)
         else:
             self.move(settings, rows, number, number + (1 if self.what == "DOWN" else -1))
 
     def remove(self, settings, rows, number):
-        """Take the row out; with a player his passes, his Empty and what the scene has made of him."""
+        """Remove a row; for a player also their passes, their Empty and what the scene has created for them."""
         if self.rows == "players":
             shown.check(rows[number])
             shown.let_go(rows[number])
@@ -75,15 +75,15 @@ stands, which becomes his body"""
         setattr(settings, ACTIVE[self.rows], max(0, min(number, len(rows) - 1)))
 
     def move(self, settings, rows, number, goal):
-        """Exchange it with its neighbour."""
+        """Exchange a row with its neighbour."""
         if not 0 <= goal < len(rows):
-            raise InputError(self.rows, "it is at the end of the list", "a row that can be moved that way")
+            raise InputError(self.rows, "it is at the end of the list", "a row that can move in that direction")
         rows.move(number, goal)
         setattr(settings, ACTIVE[self.rows], goal)
 
 
 def add_player(context) -> None:
-    """One more player."""
+    """Add a player at the selected armature or near the 3D cursor."""
     settings, scene = context.scene.beyond_mocap_passes, context.scene
     count, units = len(settings.players), units_per_metre(scene)
     body = context.view_layer.objects.active
@@ -94,6 +94,7 @@ def add_player(context) -> None:
         row = order.add_player(context, order.free_name(settings) if taken else body.name, place, facing)
         row.body = body
         return
+    # the first three players on a triangle, more on a ring twice as wide
     angle = math.radians(90.0 + 120.0 * count) if count < 3 else math.radians(30.0 + 60.0 * (count - 3))
     ring = RING * (1.0 if count < 3 else 2.0)
     x, y = scene.cursor.location.x / units, scene.cursor.location.y / units
@@ -102,7 +103,7 @@ def add_player(context) -> None:
 
 
 def standing(scene, body) -> tuple[tuple[float, float], float]:
-    """Where an armature stands now, and which way it looks."""
+    """Measure where an armature stands on the current frame, and its heading in rad."""
     from ..beyond_mocap.motion.humanoid import heading
 
     try:
@@ -114,7 +115,7 @@ def standing(scene, body) -> tuple[tuple[float, float], float]:
 
 
 def add_pass(settings) -> None:
-    """One more pass, from who gets the last one to the next in the list."""
+    """Add a pass from the receiver of the last one to the next player in the list."""
     names = [row.name for row in settings.players]
     if len(names) < 2:
         raise InputError("passes", f"{len(names)} players", "two or more", "add players first")
@@ -128,20 +129,20 @@ def add_pass(settings) -> None:
 
 
 class BEYOND_MOCAP_OT_passes_make(BackgroundVerb, bpy.types.Operator):
-    """Let the players of the list pass the ball as the passes say: bodies and ball are made where there are none. Each
-flight leaves one body at its strike and arrives at the next one at his"""
+    """Generate the passing scene: characters and ball are created where there are none, and each flight of the ball
+leads from one player's strike to the next"""
 
     bl_idname = "beyond_mocap.passes_make"
     bl_label = "Make Scene"
     kind = "passes"
     live: BoolProperty(name="Live", options={"HIDDEN", "SKIP_SAVE"},
-                       description="Whether an edit asked for it: what is wrong is told in the panel")
-    needs = ("Add players and passes, or take a sample",
+                       description="Start as an update after an edit, with errors shown in the panel")
+    needs = ("Add players and passes, or choose a sample",
              lambda context: len((settings := context.scene.beyond_mocap_passes).players) > 1
              and len(settings.passes) > 0)
 
     def order(self, context):
-        """What is to be made."""
+        """Build the order for the scene."""
         if not self.live:
             order.forget_examples()
         return make.order_of(context.scene)
@@ -149,23 +150,23 @@ flight leaves one body at its strike and arrives at the next one at his"""
     work = staticmethod(make.work)
 
     def apply(self, scene, result):
-        """Bodies and ball; what is shown is what was ordered."""
+        """Apply the result to characters and ball."""
         rows = {row.name for row in scene.beyond_mocap_passes.players}
         if missing := [one.name for one in result.passes.players if one.name not in rows]:
-            raise InputError("players", f"{missing[0]} is gone from the list meanwhile", "the same players",
+            raise InputError("players", f"{missing[0]} is no longer in the list", "the same players",
                              "press Make Scene again")
         make.show(scene, result)
         self.report({"INFO"}, ", ".join(scene.beyond_mocap_passes.figures.splitlines()[:3]))
 
     def modal(self, context, event):
-        """One that an edit asked for makes way for the next edit's without a word."""
+        """Let an update that an edit started end silently when the next edit starts another one."""
         if self.live and self.job.stale:
             self.ended(context)
             return {"CANCELLED"}
         return super().modal(context, event)
 
     def failed(self, message):
-        """A live edit that makes no sense just now is told in the panel; the scene shown stays."""
+        """Show the error of an update in the panel; the scene that is shown stays."""
         if not self.live:
             return super().failed(message)
         bpy.context.scene.beyond_mocap_passes.told = message
@@ -173,33 +174,32 @@ flight leaves one body at its strike and arrives at the next one at his"""
 
 
 class BEYOND_MOCAP_OT_passes_clear(Verb, bpy.types.Operator):
-    """Take away what Make Scene has made: bodies, ball and net. Bodies that were yours play their own motion again; the
-lists stay"""
+    """Remove the characters, ball and net that Make Scene has created; your own characters play their own motion
+again, and the lists stay"""
 
     bl_idname = "beyond_mocap.passes_clear"
     bl_label = "Clear Scene"
-    needs = "Nothing has been made", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
+    needs = "There is no scene to clear", lambda context: bool(context.scene.beyond_mocap_passes.made_of)
 
     def do(self, context):
         make.clear(context.scene)
 
 
 class BEYOND_MOCAP_OT_passes_sample(Verb, bpy.types.Operator):
-    """Fill the lists with a scene to begin with. What they hold now is replaced; players of the same name keep
-their bodies"""
+    """Replace the lists with a sample scene; players with the same name keep their characters"""
 
     bl_idname = "beyond_mocap.passes_sample"
     bl_label = "Sample Scene"
-    sample: EnumProperty(name="Sample", items=SAMPLES, description="Which one")
+    sample: EnumProperty(name="Sample", items=SAMPLES, description="Sample scene to use")
 
     def do(self, context):
-        """Read it, fill the lists."""
+        """Parse the sample and set the lists."""
         order.fill(context, scene_json.parse_scene(SCENES[self.sample], self.sample))
-        self.report({"INFO"}, "drag the players' Empties, edit the passes, then press Make Scene")
+        self.report({"INFO"}, "Move the players' Empties, edit the passes, then press Make Scene")
 
 
 class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
-    """Fill the lists with a scene from a SCENE.json, as the command passes takes it"""
+    """Replace the lists with a scene from a SCENE.json file"""
 
     bl_idname = "beyond_mocap.passes_from_json"
     bl_label = "Scene from File"
@@ -207,13 +207,13 @@ class BEYOND_MOCAP_OT_passes_from_json(ImportVerb, bpy.types.Operator):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Read it, fill the lists."""
+        """Read the file and set the lists."""
         path = self.chosen_one("one SCENE.json")
         order.fill(context, scene_json.read_scene(path))
 
 
 class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
-    """Write the scene as a SCENE.json, for the command passes or another file"""
+    """Write the scene to a SCENE.json file, for the command line or another blend file"""
 
     bl_idname = "beyond_mocap.passes_to_json"
     bl_label = "Scene to File"
@@ -222,9 +222,9 @@ class BEYOND_MOCAP_OT_passes_to_json(Verb, bpy.types.Operator, ExportHelper):
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
     def do(self, context):
-        """Work it out, then write."""
+        """Build the scene and write it."""
         text = scene_json.scene_text(order.scene_of(context.scene))
         atomic_write(bpy.path.abspath(self.filepath), text)
         missing = order.list_lost_examples(context.scene.beyond_mocap_passes)
         self.report({"WARNING" if missing else "INFO"},
-                    ", ".join(filter(None, (f"written to {self.filepath}", missing))))
+                    ", ".join(filter(None, (f"Written to {self.filepath}", missing))))

@@ -20,7 +20,7 @@ KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
 
 
 class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
-    """Touches that were solved from tracking."""
+    """Touches that were solved from tracking data."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -50,7 +50,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
 
 
 def tracked(panel, layout, context) -> None:
-    """The button, what was solved, and the touches."""
+    """Draw the button, figures of the solved ball, and its touches."""
     settings = context.scene.beyond_mocap_passes
     layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
     panel.progress(context, "ball")
@@ -71,7 +71,7 @@ def tracked(panel, layout, context) -> None:
 
 
 def hits(layout, context) -> None:
-    """What to look for, the graph, and a line for each strike that goes there."""
+    """Draw the settings of the hit analysis, its picture, and a button for each strike."""
     body = subject(context)
     if body is None:
         paragraph(layout, "Select an armature with a motion", "INFO")
@@ -99,7 +99,7 @@ def hits(layout, context) -> None:
 
 
 def carried(layout, context) -> None:
-    """Who carries the ball and when."""
+    """Draw the settings of a hold and the stretches in which the ball is carried."""
     settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
     layout.label(text=ball.name if ball is not None else "No ball: select one",
                  icon="SPHERE" if ball is not None else "INFO")
@@ -119,7 +119,7 @@ def carried(layout, context) -> None:
         return
     for number, hold in enumerate(ball.beyond_mocap_ball.holds):
         row = layout.row(align=True)
-        row.label(text=f"{hold.first} to {hold.last}: {hold.body.name if hold.body else 'gone'}, {hold.bone}")
+        row.label(text=f"{hold.first} to {hold.last}: {hold.body.name if hold.body else 'missing'}, {hold.bone}")
         row.operator("beyond_mocap.free_ball", text="", icon="X").number = number
 
 
@@ -177,7 +177,7 @@ def physics(layout, context, ball) -> None:
 
 
 def stream(layout, context) -> None:
-    """Where to listen, how it does, and the last strike."""
+    """Draw the settings of the stream, its status, and the last strike."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
     column = split(layout)
     chosen = column.column()
@@ -199,7 +199,7 @@ def stream(layout, context) -> None:
 
 
 def live(panel, layout, context) -> None:
-    """Who has the ball, and to whom it goes."""
+    """Draw the settings of Play Live and the state of the rally."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
     column = split(layout)
     column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
@@ -228,7 +228,7 @@ class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
-    """The passes, one after the other."""
+    """The passes in their order."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -243,7 +243,7 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
 
 
 def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
-    """A list with what adds to it, takes away and moves."""
+    """Draw a list with buttons to add, remove and move rows."""
     row = layout.row()
     row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active_propname=active, rows=3)
     column = row.column(align=True)
@@ -253,7 +253,7 @@ def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> Non
 
 
 def passing(panel, layout, context) -> None:
-    """Players, passes, ball, and what comes of them."""
+    """Draw players, passes, ball, and the result of the scene."""
     settings = context.scene.beyond_mocap_passes
     row = layout.row(align=True)
     row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
@@ -280,7 +280,7 @@ def passing(panel, layout, context) -> None:
 
 
 def strikes(layout, settings) -> None:
-    """Figures, and a line for each strike that goes there."""
+    """Draw figures and a button for each strike."""
     table(layout, settings.figures.splitlines())
     column = layout.column(align=True)
     for frame, text in told_lines(settings.strikes):
@@ -288,7 +288,7 @@ def strikes(layout, settings) -> None:
 
 
 def of_player(layout, player) -> None:
-    """Where the picked player stands, and what he strikes with."""
+    """Draw the settings of the active player."""
     column = split(layout)
     for name in ("place", "body", "part"):
         column.prop(player, name)
@@ -302,7 +302,7 @@ def of_player(layout, player) -> None:
 
 
 def of_pass(layout, settings, one) -> None:
-    """How the picked pass goes."""
+    """Draw the settings of the active pass."""
     column = split(layout)
     column.prop_search(one, "who", settings, "players")
     column.prop_search(one, "to", settings, "players")
@@ -321,7 +321,7 @@ def of_pass(layout, settings, one) -> None:
 
 
 def choices(layout, settings) -> None:
-    """What holds for all passes."""
+    """Draw the settings of all passes."""
     column = split(layout)
     for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
         column.prop(settings, name)
@@ -338,17 +338,17 @@ def choices(layout, settings) -> None:
 
 
 def weights(layout, settings) -> None:
-    """Of eq. 1 and 2."""
+    """Draw the weights of eq. 1 and eq. 2."""
     column = split(layout)
-    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")),
-                         ("Two Poses Compared", ("position", "velocity", "bones"))):
+    for title, names in (("Compare Strikes", ("speed", "vectors", "times")),
+                         ("Compare Poses", ("position", "velocity", "bones"))):
         column.label(text=title)
         for name in names:
             column.prop(settings.weights, name)
 
 
 def of_ball(layout, settings) -> None:
-    """The ball's kind, or numbers of one's own."""
+    """Draw the ball's kind, or its custom values."""
     column = split(layout)
     column.prop(settings, "ball")
     column.prop(settings, "own")

@@ -1,10 +1,8 @@
-"""The recipe of one player of a passing scene: his hit motions where and when they were ordered, and what he does
-between.
+"""Recipe for one player of a passing scene: the ordered hit motions in place, and what the player does between them.
 
-The path search binds each hit motion to its moment and fills the rest with standing, walking and turning (`synthesis`);
-`passes.way` says where he goes and faces; feet are held or step (`synthesis.construct`); his head follows the ball
-(`synthesis.construct.gaze`), and the striking part is brought to it (`synthesis.construct.strike_at`). The ball
-is never moved.
+The path search binds each hit motion to its moment and fills the rest with standing, walking and turning. `player_path`
+gives position and facing. Feet are planted or step, the head follows the ball, and the striking part is brought to the
+ball. The ball is never moved.
 """
 
 from __future__ import annotations
@@ -49,20 +47,25 @@ from .links import BoneWeights, weigh_bones
 from .way import HitOrder, Placed, Stance, needed, placed, way
 
 TRANSITION = 0.4
-"""Seconds over which one piece of clip gives way to the next."""
+"""Seconds over which one piece of a clip blends into the next."""
 FASTER = 1.15
-"""Times the library's highest speed that a player may go without being told."""
+"""Times the library's highest speed that a player reaches without a warning."""
 OWN_HEAD = 0.3
-"""Seconds around a header in which the head moves as recorded; it goes over within as many more."""
-_PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # "hand" itself is no label
-_WATCHED = 0.02  # weight of facing the ball, where he stands, against his clip's own turning
+"""Seconds around a header in which the head moves as recorded; it blends over as many more."""
+_PART_LABELS = {**{part: part for part in BODY_PARTS}, "hand": "throw"}  # there is no label "hand"
+_WATCHED = 0.02  # weight of facing the ball while standing, against the clip's own turning
 
 
 @dataclass(frozen=True)
 class BodySettings:
-    """transition: seconds of a fade between pieces of clips (§4: S_T). watch: whether the head follows the ball. seed:
-    of the take's record; nothing here is left to chance. weights: of bones in eq. 1, by which one pose is like another
-    where a clip is left for the next."""
+    """Settings of the players' motion.
+
+    Attributes:
+        transition: seconds of the blend between pieces of clips (section 4: S_T).
+        watch: whether the head follows the ball.
+        seed: seed that the take records; nothing here is left to chance.
+        weights: bone weights of eq. 1, by which poses are compared where one clip is left for the next.
+    """
 
     transition: float = TRANSITION
     watch: bool = True
@@ -72,9 +75,14 @@ class BodySettings:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlayerMotion:
-    """One player of a passing scene. take: his motion with contacts, provenance and all, as `synthesize` gives it. gaps
-    (K,) m between part and ball at each order's strike, NaN where he misses; moved (K,) m that the part was moved for
-    it. warnings: what could not be as ordered."""
+    """The motion of one player of a passing scene, K strikes.
+
+    Attributes:
+        take: motion with contacts and provenance, as `synthesize` gives it.
+        gaps: (K,) m between part and ball at each strike, NaN where the player misses.
+        part_shifts: (K,) m by which the part was moved to meet the ball.
+        warnings: what differs from the orders.
+    """
 
     take: Take
     gaps: np.ndarray
@@ -86,10 +94,26 @@ def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], 
                   ball_radius: float = BALL_RADIUS, fps: float = 30.0, settings: BodySettings = BodySettings(),
                   progress: Callable[[float, str], None] | None = None,
                   cancelled: Callable[[], bool] | None = None) -> PlayerMotion:
-    """The motion of a player who begins at `stance` and strikes as `orders` say.
+    """Build the motion of a player who begins at `stance` and strikes as ordered.
 
-    ball: its path at `fps` over the whole scene, which is the motion's. The same input gives the same bits. InputError
-    for orders outside the scene or two at once; Cancelled."""
+    The same input gives the same bits.
+
+    Args:
+        library: the library.
+        stance: where the player begins.
+        orders: strikes of this player, in any order.
+        ball: its path at `fps` over the whole scene; the motion has the same length.
+        ball_radius: m.
+        fps: frames per second of the motion.
+        settings: settings of the motion.
+        progress: receives the share of the work done and a short text.
+        cancelled: whether to stop.
+    Returns:
+        The motion with its gaps and warnings.
+    Raises:
+        InputError: for orders outside the scene, or two at one time.
+        Cancelled: if `cancelled` returns True.
+    """
     from threadpoolctl import threadpool_limits
 
     orders = sorted(orders, key=lambda order: order.time)
@@ -100,8 +124,17 @@ def player_motion(library: Library, stance: Stance, orders: Sequence[HitOrder], 
 
 
 def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) -> float:
-    """Seconds from one strike (or from standing) to the next that the body needs in haste: to come out of the one
-    motion, to go over and turn, and to begin the other."""
+    """Estimate the least time that the body needs from one strike, or from standing, to the next.
+
+    It has to leave the one motion, travel and turn, and begin the other.
+
+    Args:
+        library: the library.
+        before: the strike before, or where the player stands.
+        after: the next strike.
+    Returns:
+        Seconds.
+    """
     then = Placed.of(library, after)
     into = after.time - then.start
     end = (0.0, then.path(np.array([then.start]))[0], then.velocity(then.start))
@@ -117,24 +150,32 @@ def least_seconds(library: Library, before: HitOrder | Stance, after: HitOrder) 
 
 
 def strike_words(library: Library) -> frozenset[str]:
-    """The words by which the library's key moments are told from what goes on between them."""
+    """Collect the labels that key moments of the library have and its other rows do not."""
     rows = [row for clip in library.clips for row in clip.annotations]
     between = {word for row in rows if row.key is None for word in row.words}
     return frozenset(word for row in rows if row.key is not None for word in row.words) - between
 
 
 def _check(orders: Sequence[HitOrder], times: np.ndarray, fps: float) -> None:
+    """Check that the orders lie within the scene and that no two are at one time."""
     for order in orders:
         if not times[0] - 0.5 / fps <= order.time <= times[-1] + 0.5 / fps:
             scene = f"{told_time(times[0])} to {told_time(times[-1])} s"
             raise InputError("strike", f"at {told_time(order.time)} s", f"within the scene, {scene}")
     for before, after in zip(orders, orders[1:]):
         if after.time - before.time < 2.0 / fps:
-            raise InputError("strike", f"two of one player at {after.time:g} s", "one at a time")
+            raise InputError("strike", f"one player has two at {after.time:g} s", "one at a time")
 
 
 class _Body:
-    """One player on his way to his motion."""
+    """Builds the motion of one player.
+
+    Attributes:
+        start: s of the scene's first frame.
+        hits: the placed hit motions.
+        times: (T,) s of the motion's frames.
+        ball: (T, 3) m, world frame.
+    """
 
     def __init__(self, library, stance, orders, ball, ball_radius, count, fps, settings):
         self.library, self.orders, self.fps, self.settings = library, orders, fps, settings
@@ -145,6 +186,7 @@ class _Body:
         self.ball = interpolate(self.times, ball.times, ball.positions)
 
     def made(self, progress, cancelled) -> PlayerMotion:
+        """Search, construct, turn the head and solve ball contact."""
         report = progress or (lambda fraction, text: None)
         count = max(int(np.floor((self.times[-1] - self.start) * self.library.fps + 1e-6)) + 1, 2)
         order = self._wanted(self.start + np.arange(count) / self.library.fps)
@@ -154,12 +196,13 @@ class _Body:
             self.library, order, progress=lambda part, text: report(0.7 * part, text), cancelled=cancelled,
             alike=measure,
         ).run()
+        # output frames as fractional frames of the search, which runs at the library's rate
         index = np.minimum((self.times - self.start) * self.library.fps, count - 1)
         source = fetch(self.library, edit, index, self.fps)
         track, path = self._track(self.times, self.fps)
         asked = self._plan(track)
         plan = resolve_plan(asked, self.library)
-        report(0.75, "Laying out")
+        report(0.75, "Constructing motion")
         planted, taken = Construction(library=self.library, plan=plan, track=track, source=source,
                                       touches=self._touches(), heading=self._heading(track, path.facing, source),
                                       planned=True).lay_out()
@@ -175,7 +218,7 @@ class _Body:
         return PlayerMotion(take=take, gaps=struck.gap, moved=struck.moved, warnings=self._warnings(struck, track))
 
     def _wanted(self, times: np.ndarray) -> Wanted:
-        """What the search is asked for, at the library's rate."""
+        """Build the request to the search, at times (T,) s with the library's rate."""
         library = self.library
         track, _ = self._track(times, library.fps)
         speeds = np.array([gait.speed for gait in library.gaits])
@@ -192,6 +235,7 @@ class _Body:
                       keys=keys, allowed=allowed, warnings=(), avoided=avoided)
 
     def _key(self, hit: Placed, frame: float) -> WantedKey:
+        """Build the key moment of a placed hit at a fractional `frame` of the search."""
         order = hit.order
         clip = self.library.clips[order.clip]
         frames = range(int(hit.first), int(hit.last) + 1)
@@ -201,7 +245,7 @@ class _Body:
                          used_instead=None, ball_height_known=True, rates=(1.0,))
 
     def _track(self, times: np.ndarray, fps: float):
-        """The little track (`SampledTrack`) of his way at seconds (T,), and the way itself."""
+        """Build the track of the player's path at times (T,) s, and the path itself."""
         path = way(self.stance, self.hits, times)
         velocity = np.gradient(path.positions, 1.0 / fps, axis=0)
         ball = interpolate(times, self.times, self.ball)
@@ -212,13 +256,16 @@ class _Body:
         return track, path
 
     def _plan(self, track: SampledTrack) -> Plan:
-        """What stands in a take's plan: the little track."""
+        """Build the plan that the take stores: the track of the player's path."""
         return Plan(track=Track(track.times, track.positions, track.ball), library=self.library.folder, fps=self.fps,
                     seam_window=2.0 * self.settings.transition, seed=self.settings.seed, made=False)
 
     def _heading(self, track: SampledTrack, kept: np.ndarray, source: Footage) -> np.ndarray:
-        """(T,) rad: as recorded in his hit motions, and between them the compromise of `on_track.facing`, turning the
-        short way round."""
+        """Compute the heading (T,) rad: as recorded in hit motions, and between them a compromise, turned the short
+        way.
+
+        Between hit motions the goals are the direction of travel and, while standing, the ball; each is weighted.
+        """
         known = np.flatnonzero(np.isfinite(kept))
         rough = np.interp(np.arange(len(kept)), known, kept[known])
         own_speed = np.linalg.norm(source.velocity, axis=1)
@@ -227,6 +274,7 @@ class _Body:
         travel = track.direction - arctan2(source.velocity[:, 1], source.velocity[:, 0])
         watch = track.direction + wanted_offset(track)
         weights = np.stack([going, _WATCHED * np.clip(1.0 - track.speed, 0.0, 1.0) ** 2])
+        # both goals as the nearest angle to the rough heading, so that no weighted mean turns past half a turn
         goals = rough + quaternion.wrapped(np.stack([travel, watch]) - rough)
         trust = weights.sum(axis=0) + 1e-6
         goal = ((weights * goals).sum(axis=0) + 1e-6 * rough) / trust
@@ -235,15 +283,16 @@ class _Body:
         return follow_turning(goal, trust, source.turn)
 
     def _touches(self) -> list[Touch]:
-        """The hit motions as stretches in which no steps are added."""
+        """Build the hit motions as stretches in which no steps are added."""
         return [
             Touch((hit.order.time - self.start) * self.fps, ("kick",), (hit.order.time - hit.start) * self.fps,
                   (hit.end - hit.order.time) * self.fps) for hit in self.hits
         ]  # fmt: skip
 
     def _watching(self, body: Motion) -> Motion:
-        """The body with its head on the ball, but for the moments in which the head itself strikes; the chest, which
-        carries the arms, stays out of it in his hit motions."""
+        """Turn the head to the ball, except around headers; in hit motions the chest, which carries the arms, is left
+        alone.
+        """
         if not self.settings.watch:
             return body
         share = np.ones(len(self.times))
@@ -258,6 +307,7 @@ class _Body:
         return following(body, self.ball, look_of(self.library), share, CHEST * arms)
 
     def _meetings(self) -> list[Meeting]:
+        """Build the ball contacts to solve: frame, surface, ball centre, and the blend in and out."""
         skeleton, out = self.library.skeleton, []
         for hit in self.hits:
             order = hit.order
@@ -269,12 +319,13 @@ class _Body:
         return out
 
     def _warnings(self, struck: Met, track: SampledTrack) -> tuple[str, ...]:
+        """Describe where the player would be too fast and where the part does not reach the ball."""
         told, fastest = [], int(np.argmax(track.speed))
         if track.speed[fastest] > FASTER * self.library.fastest:
             asks, has = track.speed[fastest], self.library.fastest
             told.append(
-                f"{self.times[fastest]:.2f} s: he would have to run {asks:.1f} m/s to be there in time; "
-                f"the library has {has:.1f} m/s: give him more time, or a place nearer by"
+                f"{self.times[fastest]:.2f} s: the player has to run {asks:.1f} m/s to arrive in time, but "
+                f"the library has only {has:.1f} m/s: allow more time, or choose a nearer place"
             )
         for order, gap in zip(self.orders, struck.gap):
             if gap > 0.005:

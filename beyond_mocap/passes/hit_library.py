@@ -1,10 +1,9 @@
-"""The hit motions of a library, and which of them resembles an example (Ball handling §4 eq. 2).
+"""The hit motions of a library, and which of them resembles an example (Ball handling, section 4, eq. 2).
 
-Every clip and its mirrored twin are analysed for either side, so that what one foot can do the other can do too. All
-hit motions go by one distance: of the part's greatest speed, of its way from pose to pose, and of how long each part of
-the way takes. The example may be of another body: its speed and ways are taken in the library's size. Which way a hit
-motion is turned about the vertical does not matter here; `pass_choice` does that, by any angle or in steps of 45
-degrees.
+Every clip and its mirrored twin are analysed for both sides, so what one foot can do the other can do too. One distance
+compares all hit motions: of the part's highest speed, of its displacements from pose to pose, and of how long each of
+them takes. The example may come from another body: its speed and displacements are scaled to the library's size. The
+heading of a hit motion does not matter here; `pass_choice` turns it, by any angle or in steps of 45 degrees.
 """
 
 from __future__ import annotations
@@ -25,15 +24,20 @@ from . import kept
 from .hits import HitMotion, analyse, hit_at
 
 KINDS = ("toss", "pass", "attack")
-# m/s of the part between toss and pass, and between pass and attack (§5: told apart by the greatest speed)
+# m/s of the part between toss and pass, and between pass and attack (section 5 divides them by highest speed)
 _BOUNDS = {"foot": (4.5, 7.5), "hand": (4.0, 7.0), "head": (2.0, 3.5), "chest": (1.0, 2.0), "tool": (8.0, 13.0)}
-_MOVES = 0.3  # m/s: the least of a part that is said to touch the ball
+_MOVES = 0.3  # m/s: least speed of a part whose labels say that it touches the ball
 
 
 @dataclass(frozen=True)
 class MatchWeights:
-    """How much each part of eq. 2 counts: seconds by which a difference of greatest speed is weighed (w_v), the weight
-    of the ways in metres (w_m), and m/s by which differences of time are weighed (w_t)."""
+    """Weights of the terms of eq. 2.
+
+    Attributes:
+        speed: w_v, seconds: per m/s of difference in highest speed.
+        vector: w_m: per metre of difference in displacement.
+        time: w_t, m/s: per second of difference in duration.
+    """
 
     speed: float = 0.1
     vector: float = 1.0
@@ -42,8 +46,13 @@ class MatchWeights:
 
 @dataclass(frozen=True, eq=False)
 class LibraryHit:
-    """A hit motion of a library: the clip's index, the hit motion in the clip's own frames, and whether the clip's
-    words name the moment; then that is its key."""
+    """A hit motion of a library.
+
+    Attributes:
+        clip: index of the clip in the library.
+        hit: the hit motion, in the clip's own frames.
+        is_labelled: whether the clip's labels name the moment; then the key is the labelled one.
+    """
 
     clip: int
     hit: HitMotion
@@ -52,16 +61,33 @@ class LibraryHit:
 
 @dataclass(frozen=True, eq=False)
 class HitLibrary:
-    """All hit motions of one part, H of them, in the order of the clips."""
+    """All hit motions of one part, H of them, in the order of the clips.
+
+    Attributes:
+        part: part that strikes.
+        hits: the hit motions.
+    """
 
     part: str
     hits: tuple[LibraryHit, ...]
 
     @staticmethod
     def of(library: Library, part: str = "foot", tool: Tool | None = None) -> "HitLibrary":
-        """The hit motions of all clips of a library; kept beside its cache. Where words say what a clip shows, only
-        what they call a touch of this part counts. InputError for a part that the skeleton lacks."""
-        name = f"hits_{hex_digest(repr((part, tool)))}"  # joints may be called Head, or a/b
+        """Build or load the hit motions of all clips of a library.
+
+        Where labels say what a clip shows, only what they call a touch of this part counts. Stored beside the library's
+        cache.
+
+        Args:
+            library: the library.
+            part: "foot", "head", "chest", "hand", "tool", or a joint's name.
+            tool: what is in the hand.
+        Returns:
+            The hit motions.
+        Raises:
+            InputError: if the skeleton lacks the part.
+        """
+        name = f"hits_{hex_digest(repr((part, tool)))}"  # a digest, because joints may be called Head, or a/b
         arrays = kept.load(library, name)
         if arrays is not None:
             return HitLibrary(part, _restored(part, arrays))
@@ -76,7 +102,7 @@ class HitLibrary:
 
     @cached_property
     def _arrays(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Size (H,) m, greatest speed (H,) m/s, ways (H, 4, 3) m and times (H, 4) s."""
+        """Sizes (H,) m, highest speeds (H,) m/s, displacements (H, 4, 3) m and times (H, 4) s."""
         hits = [one.hit for one in self.hits]
         return (np.array([hit.size for hit in hits]), np.array([hit.max_speed for hit in hits]),
                 np.array([hit.vectors for hit in hits]).reshape(-1, 4, 3),
@@ -84,26 +110,36 @@ class HitLibrary:
 
     @cached_property
     def sides(self) -> np.ndarray:
-        """(H,) "left", "right" or ""."""
+        """Side of each hit, (H,): "left", "right" or ""."""
         return np.array([one.hit.side for one in self.hits], dtype="<U5")
 
     @property
     def speeds(self) -> np.ndarray:
-        """(H,) m/s: the part's greatest speed."""
+        """Highest speed of the part in each hit, (H,) m/s."""
         return self._arrays[1]
 
     @cached_property
     def kinds(self) -> tuple[str, ...]:
-        """Toss, pass or attack, by the greatest speed (§5)."""
+        """Kind of each hit, toss, pass or attack, by its highest speed (section 5)."""
         return tuple(KINDS[int(np.searchsorted(_bounds(self.part), speed, "right"))] for speed in self.speeds)
 
     def match(self, example: HitMotion, weights: MatchWeights = MatchWeights(),
               side: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """How much each hit motion differs from an example (eq. 2), and their order.
+        """Compute how much each hit motion differs from an example (eq. 2), and sort them.
 
-        side: only hit motions of this side (None: all). Returns (order (K,), most alike first, indices into `hits`;
-        distance (H,) m). Ways are compared as each body sees them, so it does not matter where either faces."""
+        Displacements are compared in each body's own frame, so headings do not matter.
+
+        Args:
+            example: the example, of a body of any size.
+            weights: weights of eq. 2.
+            side: only hit motions of this side; None: all.
+        Returns:
+            order: (K,) indices into `hits`, most similar first.
+            distance: (H,) m.
+        Source: Ball handling, section 4, eq. 2.
+        """
         size, speed, vectors, times = self._arrays
+        # scale from the example's body to the library's, by leg length
         grown = size / max(example.size, 1e-6)
         distance = weights.speed * np.abs(speed - grown * example.max_speed)
         away = vectors - grown[:, None, None] * example.vectors
@@ -113,20 +149,31 @@ class HitLibrary:
         return (order if side is None else order[self.sides[order] == side]), distance
 
     def of_kind(self, kind: str, side: str | None = None) -> np.ndarray:
-        """Indices (K,) into `hits`, what suits a toss, a pass or an attack best first: whose speed lies in the kind's
-        range, then whose is nearest to it; within the range those that words name first, then the nearest to its middle
-        (of attacks the fastest)."""
+        """Sort the hits by how well they suit a toss, a pass or an attack.
+
+        First come those whose speed lies within the kind's range, then those nearest to it. Within the range come first
+        those
+        that labels name, then those nearest to its middle (for attacks the fastest).
+
+        Args:
+            kind: "toss", "pass" or "attack".
+            side: only hit motions of this side; None: all.
+        Returns:
+            (K,) indices into `hits`, best first.
+        """
         edges = (0.0, *_bounds(self.part), np.inf)
         low, high = edges[KINDS.index(kind)], edges[KINDS.index(kind) + 1]
+        # m/s by which each hit misses the kind's speed range
         outside = np.maximum(low - self.speeds, 0.0) + np.maximum(self.speeds - high, 0.0)
         unnamed = np.array([not one.labelled for one in self.hits], dtype=bool)
         typical = np.abs(self.speeds - 0.5 * (low + high)) if np.isfinite(high) else -self.speeds
+        # last key first: range, then labels, then typical speed, then the order of clips
         order = np.lexsort((np.arange(len(self)), typical, unnamed, outside))
         return order if side is None else order[self.sides[order] == side]
 
 
 def kind_of(hit: HitMotion) -> str:
-    """Toss, pass or attack, by the greatest speed of the part (§5)."""
+    """Classify a hit motion as toss, pass or attack by the part's highest speed (section 5)."""
     return KINDS[int(np.searchsorted(_bounds(hit.part), hit.max_speed, "right"))]
 
 
@@ -135,6 +182,7 @@ def _bounds(part: str) -> tuple[float, float]:
 
 
 def _of_clip(index: int, clip: Clip, part: str, tool: Tool | None) -> list[LibraryHit]:
+    """Find the hit motions of one clip, with labelled keys where there are labels, in order of time."""
     if len(clip.recording) < 3:
         return []
     sides = ("left", "right") if part in ("foot", "hand", "tool") else ("",)
@@ -145,7 +193,7 @@ def _of_clip(index: int, clip: Clip, part: str, tool: Tool | None) -> list[Libra
 
 
 def _labelled(index: int, clip: Clip, hit: HitMotion) -> LibraryHit:
-    """The hit motion with the key that the clip's words give, where they name a touch of this part within it."""
+    """Build a library hit, with the labelled key where the clip's labels name a touch of this part within it."""
     for row in clip.annotations:
         if row.key is not None and hit.first < row.key < hit.last and _names(row.words, hit.part, hit.side):
             return LibraryHit(index, replace(hit, key=int(round(row.key))), True)
@@ -153,8 +201,10 @@ def _labelled(index: int, clip: Clip, hit: HitMotion) -> LibraryHit:
 
 
 def _unseen(clip: Clip, part: str, sides, hits: list[HitMotion], tool: Tool | None) -> list[HitMotion]:
-    """Touches that the clip's words name and the analysis has not seen: a trap is slow, a header may do without a jump.
-    Where the words name no side, it is the faster one."""
+    """Build hit motions for labelled touches that the analysis does not see: a trap is slow, a header may need no jump.
+
+    Where the labels name no side, the faster side is taken.
+    """
     found = []
     for row in clip.annotations:
         if row.key is None or any(hit.first < row.key < hit.last and _names(row.words, part, hit.side) for hit in hits):
@@ -167,20 +217,22 @@ def _unseen(clip: Clip, part: str, sides, hits: list[HitMotion], tool: Tool | No
 
 
 def _around(row, clip: Clip) -> tuple[int, int]:
-    """First and last frame of a touch: its row, at most a second before and behind its key."""
+    """Compute the first and last frame of a touch: its row, at most a second before and after its key."""
     reach = clip.motion.fps
     return int(max(row.start, row.key - reach)), int(min(row.end, row.key + reach))
 
 
 def _names(words, part: str, side: str) -> bool:
-    """Whether words name a touch of this part and side."""
+    """Whether labels name a touch of this part and side."""
     sides = {"left", "right"} & set(words) if part in ("foot", "hand") else set()
     return striking_part(words) == part and (not sides or side in sides)
 
 
 def _told(clip: Clip, hit: HitMotion) -> bool:
-    """Whether the clip's words call this a touch of the part, or say nothing here but elsewhere in the clip; words do
-    not know tools and joints."""
+    """Whether the clip's labels call this a touch of the part.
+
+    Where no row covers the hit, all rows of the clip count. Labels do not know tools and joints, so those always pass.
+    """
     if hit.part not in BODY_PARTS:
         return True
     here = [row.words for row in clip.annotations if row.start <= hit.key <= row.end]
@@ -189,12 +241,14 @@ def _told(clip: Clip, hit: HitMotion) -> bool:
     return juggles or any(_names(words, hit.part, hit.side) for words in rows)
 
 
+# fields of HitMotion that are stored: whole numbers, numbers, arrays
 _WHOLE = ("first", "last", "high", "key")
 _NUMBERS = ("max_speed", "facing", "size", "fps")
 _ARRAYS = ("vectors", "times", "velocity", "fasts")
 
 
 def _stored(hits: tuple[LibraryHit, ...]) -> dict[str, np.ndarray]:
+    """Convert hit motions to arrays that can be stored."""
     arrays = {name: np.array([getattr(one.hit, name) for one in hits]) for name in (*_WHOLE, *_NUMBERS, *_ARRAYS)}
     arrays["clip"], arrays["labelled"] = np.array([one.clip for one in hits]), np.array([one.labelled for one in hits])
     arrays["side"] = np.array([one.hit.side for one in hits], dtype="<U5")
@@ -202,6 +256,7 @@ def _stored(hits: tuple[LibraryHit, ...]) -> dict[str, np.ndarray]:
 
 
 def _restored(part: str, arrays: dict[str, np.ndarray]) -> tuple[LibraryHit, ...]:
+    """Build hit motions from stored arrays."""
     found = []
     for row in range(len(arrays["clip"])):
         read: dict[str, Any] = {name: int(arrays[name][row]) for name in _WHOLE}

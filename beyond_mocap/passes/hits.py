@@ -1,17 +1,17 @@
-"""Hit analysis: when a part of the body can strike a ball, read from its movement alone (Ball handling §3, Fig. 2, 3).
+"""Hit analysis: detect from its movement alone when a part of the body can strike a ball (Ball handling, section 3).
 
-A **high frame** is one in which the part is higher than around it and above a threshold; a **fast frame** one in which
-it is faster than around it. Between a high frame and the fast frame beside it lies the **ball stretch**, in which a
-ball can be struck. The **hit motion** goes from the lowest place before the high frame to the lowest one after it; what
-lies between hit motions are **link stretches**, in which one clip can be left for another.
+A **high frame** is one in which the part is higher than in the frames around it and above a threshold; a **fast frame**
+is one in which it is faster than around it. Between a high frame and the adjacent fast frame lies the **ball stretch**,
+in which a ball can be struck. The **hit motion** runs from the lowest position before the high frame to the lowest one
+after it. The frames between hit motions are **link stretches**, in which one clip can be left for another (Fig. 2, 3).
 
-Nobody observed a ball: the strike's frame is the likeliest one, where the part is fastest. On recorded kicks that is
-within 3 frames (at 120 per second) of where the foot's peak was labelled, which may lead the contact by as much.
+No ball is observed: the strike's frame is the most likely one, where the part is fastest. On recorded kicks that is
+within 3 frames (at 120 per second) of the labelled peak of the foot, which itself may lead the contact by as much.
 
-What the paper leaves open, and what is done here: positions are smoothed by 0.1 s before they are compared, because
-optical markers and suits shake at an impact; a kick's swing passes the ground at its fastest, so a lowest place ends
-the hit motion only where the part is slow too; steps of walking and running lift the foot as well and are told from
-hits by the body's own speed.
+Choices where the paper is silent: positions are smoothed over 0.1 s before they are compared, because optical markers
+and suits shake at an impact. A kick's swing passes the ground at its fastest, so a lowest position ends the hit motion
+only where the part is slow as well. Steps of walking and running also lift the foot; the body's own speed separates
+them from hits.
 """
 
 from __future__ import annotations
@@ -29,25 +29,36 @@ from ..motion.skeleton import Skeleton
 from ..motion.track import zero_phase_hann
 
 _SIDED = ("foot", "hand", "tool")
-_SMOOTHING = 0.1
-_APART = 0.25
-_SLOW = 0.4
-_RISES = 0.03
-# least rise in m above where the part usually is, and least speed in m/s, of an automatic threshold's hits
+_SMOOTHING = 0.1  # s: Hann window over positions; markers and suits shake at an impact
+_APART = 0.25  # s: least distance of two fast frames; the part's return after a hit is closer
+_SLOW = 0.4  # of the highest speed in a hit motion: the part is at most so fast at its ends
+_RISES = 0.03  # m: least rise after the strike for the high frame to lie after it
+# with an automatic threshold: least rise in m above the part's typical height, and least speed in m/s, of a hit
 _LEAST_RISE = {"foot": 0.10, "head": 0.10, "chest": 0.08, "hand": 0.15, "tool": 0.20}
 _LEAST_SPEED = {"foot": 1.5, "head": 0.8, "chest": 0.6, "hand": 2.0, "tool": 2.5}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class HitMotion:
-    """One hit motion (§3: S_H), all frames of its motion's own rate.
+    """One hit motion (section 3: S_H). All frames are in its motion's own rate.
 
-    first, last: where it begins and ends. high: the highest frame. fasts: the fastest before and after it. key: the
-    likeliest frame of the strike (nobody observed a ball): the faster of the two. max_speed: of the part, m/s.
-    vectors (4, 3) m and times (4,) s: the part's way first - fast - high - fast - last, as the body sees it (x where it
-    faces on average, y to its left, the pelvis' own travel taken out), and how long each took (eq. 2: m_i, t_i).
-    velocity (3,) m/s: of the part at the key, in the same frame but with the body's travel. facing: radians, world.
-    size: the body's leg length, m. fps: frames per second."""
+    Attributes:
+        part: part of the body that strikes.
+        side: "left", "right", or "" for parts without sides.
+        first: frame on which it begins.
+        last: frame on which it ends.
+        high: highest frame.
+        fasts: fastest frame before and fastest frame after `high`.
+        key: most likely frame of the strike (no ball is observed): the faster of the two.
+        max_speed: highest speed of the part, m/s.
+        vectors: (4, 3) m, displacements first - fast - high - fast - last in the body's frame (x: its mean heading, y:
+            to its left), pelvis travel removed (eq. 2: m_i).
+        times: (4,) s, duration of each displacement (eq. 2: t_i).
+        velocity: (3,) m/s of the part at the key, in the same axes but including the body's travel.
+        facing: mean heading, rad, world.
+        size: the body's leg length, m.
+        fps: frames per second.
+    """
 
     part: str
     side: str
@@ -66,22 +77,33 @@ class HitMotion:
 
     @property
     def ball_stretch(self) -> tuple[int, int]:
-        """First and last frame in which the ball can be struck (§3: S_B), between the key and the high frame."""
+        """First and last frame in which the ball can be struck (section 3: S_B), between the key and the high frame."""
         return min(self.key, self.high), max(self.key, self.high)
 
     @property
     def direction(self) -> float:
-        """Radians from where the body faces to where the part goes at the key: where a ball would leave to."""
+        """Angle in rad from the body's heading to the part's velocity at the key: where a ball would leave to."""
         return float(np.arctan2(self.velocity[1], self.velocity[0]))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Hits:
-    """What the hit analysis found in one motion.
+    """Result of the hit analysis of one motion with T frames.
 
-    height (T,): of the part above the ground, m; speed (T,): its speed, m/s. highs, fasts: frames. threshold: the
-    height in m above which high frames were looked for. motions: in order of time, without overlap. ball_stretches,
-    links: (first, last) frames, both included. place (T, 3): the part, m, world."""
+    Attributes:
+        part: part that was analysed.
+        side: "left", "right", or "" for parts without sides.
+        fps: frames per second.
+        threshold: height in m above the ground that high frames exceed.
+        height: (T,) m, the part above the ground.
+        speed: (T,) m/s of the part.
+        place: (T, 3) m, the part, world frame.
+        highs: high frames.
+        fasts: fast frames.
+        motions: hit motions in order of time, without overlap.
+        ball_stretches: (first, last) frame of each, both included.
+        links: (first, last) frame of each link stretch, both included.
+    """
 
     part: str
     side: str
@@ -98,19 +120,29 @@ class Hits:
 
     @property
     def strongest(self) -> HitMotion | None:
-        """The hit motion in which the part is fastest; None where there is none."""
+        """The hit motion with the highest speed of the part, or None."""
         return max(self.motions, key=lambda one: one.max_speed, default=None)
 
 
 def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: float | None = None,
             joint: str | None = None, tool: Tool | None = None) -> Hits:
-    """Where `part` of one side can strike a ball.
+    """Detect the hits of one part of the body in a motion.
 
-    part: "foot", "head", "chest", "hand", "tool" (held in that side's hand), or a joint's name. side: "left" or
-    "right", no matter for head and chest. threshold: m above the ground over which the part has to rise; None: found
-    from the heights it reaches, and steps of walking and running are left out. joint: a joint's name to look at instead
-    of the part's own place. tool: what is in the hand (default: a racquet). InputError: a side that is neither, a part
-    or joint that the skeleton lacks, fewer than three frames, a threshold or poses that are no numbers."""
+    Args:
+        motion: the motion, three frames or more.
+        part: "foot", "head", "chest", "hand", "tool" (held in that side's hand), or a joint's name.
+        side: "left" or "right"; ignored for head and chest.
+        threshold: metres above the ground that the part has to exceed. None: found from the heights it reaches, and
+            steps of walking and running are left out.
+        joint: name of a joint to use instead of the part's own position.
+        tool: what is in the hand; default: a racquet.
+    Returns:
+        All high and fast frames, hit motions, ball stretches and link stretches.
+    Raises:
+        InputError: for an unknown side, a part or joint that the skeleton lacks, fewer than three frames, or NaN or
+        infinite values in the threshold or the poses.
+    Source: Ball handling, section 3.
+    """
     _check(motion, threshold)
     positions, rotations = forward_kinematics(motion)
     place = strike_place(motion.skeleton, positions, rotations, part=joint or part, side=side, tool=tool)
@@ -132,7 +164,18 @@ def analyse(motion: Motion, part: str = "foot", side: str = "right", threshold: 
 
 
 def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = None) -> HitMotion | None:
-    """The hit motion in which `part` is fastest; side "": of either side. None without any. InputError as `analyse`."""
+    """Find the hit motion with the highest speed of a part.
+
+    Args:
+        motion: the motion.
+        part: as in `detect_hits`.
+        side: "left", "right", or "" for either.
+        tool: what is in the hand.
+    Returns:
+        The hit motion, or None if there is none.
+    Raises:
+        InputError: as `detect_hits`.
+    """
     sides = (side,) if side else (("left", "right") if part in _SIDED else ("",))
     found = [hit for one in sides if (hit := analyse(motion, part, one, tool=tool).strongest)]
     return max(found, key=lambda hit: hit.max_speed, default=None)
@@ -140,8 +183,22 @@ def strongest(motion: Motion, part: str, side: str = "", tool: Tool | None = Non
 
 def hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot", side: str = "right",
            tool: Tool | None = None) -> HitMotion:
-    """The hit motion of a strike whose frame is known, within `span` (first, last): also of parts that neither rise nor
-    are fast, as in a trap, of which `analyse` sees nothing. InputError as there."""
+    """Build the hit motion of a strike whose frame is known.
+
+    Works also for parts that neither rise nor are fast, such as in a trap, which `detect_hits` does not see.
+
+    Args:
+        motion: the motion, three frames or more.
+        frame: frame of the strike.
+        span: first and last frame of the hit motion; clamped to the motion.
+        part: as in `detect_hits`.
+        side: as in `detect_hits`.
+        tool: what is in the hand.
+    Returns:
+        The hit motion with its key on `frame`.
+    Raises:
+        InputError: as `detect_hits`.
+    """
     _check(motion, None)
     positions, rotations = forward_kinematics(motion)
     place = strike_place(motion.skeleton, positions, rotations, part=part, side=side, tool=tool)
@@ -155,24 +212,43 @@ def hit_at(motion: Motion, frame: int, span: tuple[int, int], part: str = "foot"
 
 def strike_place(skeleton: Skeleton, positions: np.ndarray, rotations: np.ndarray, part: str, side: str,
                  tool: Tool | None = None) -> np.ndarray:
-    """(..., 3) m, world: the middle of the striking part, from joint positions (..., J, 3) m and world rotations
-    (..., J, 4). InputError where the skeleton lacks it."""
+    """Compute the middle of the striking part.
+
+    Args:
+        skeleton: the skeleton.
+        positions: (..., J, 3) m, joints in the world frame.
+        rotations: (..., J, 4) world rotations.
+        part: as in `detect_hits`.
+        side: "left" or "right".
+        tool: what is in the hand.
+    Returns:
+        (..., 3) m, world frame.
+    Raises:
+        InputError: if the skeleton lacks the part.
+    """
     return np.mean(striking_surface(skeleton, part, side, tool).line(positions, rotations), axis=0)
 
 
 def _check(motion: Motion, threshold: float | None) -> None:
     if len(motion) < 3:
-        raise InputError("motion", f"{len(motion)} frames", "three or more to find hits in")
+        raise InputError("motion", f"{len(motion)} frames", "three or more")
     if threshold is not None and not np.isfinite(threshold):
-        raise InputError("threshold", f"{threshold}", "metres above the ground")
+        raise InputError("threshold", f"{threshold}", "a height in metres above the ground")
     if not np.isfinite(motion.root_positions).all() or not np.isfinite(motion.rotations).all():
-        raise InputError("motion", "values that are no numbers", "numbers in every frame")
+        raise InputError("motion", "NaN or infinite values", "finite numbers in every frame")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Body:
-    """What of the body hits are seen against: pelvis (T, 3) m and its level speed (T,) m/s, both smoothed; facing (T,)
-    radians; ground: m, the height of the floor; size: leg length, m."""
+    """The body that the part's movement is compared with.
+
+    Attributes:
+        pelvis: (T, 3) m, smoothed, world frame.
+        speed: (T,) m/s of the pelvis over the ground, smoothed.
+        facing: (T,) rad, unwrapped.
+        ground: height of the floor, m.
+        size: leg length, m.
+    """
 
     pelvis: np.ndarray
     speed: np.ndarray
@@ -182,7 +258,9 @@ class _Body:
 
     @staticmethod
     def of(motion: Motion, positions: np.ndarray) -> "_Body":
+        """Measure the body of a motion with world joint positions (T, J, 3) m."""
         body = identify(motion.skeleton)
+        # the floor is the height that toes fall below in 2 % of the frames only
         toes = positions[:, [body.left.toe_or_foot, body.right.toe_or_foot], 2]
         pelvis = zero_phase_hann(positions[:, body.hips], motion.fps, _SMOOTHING)
         path = zero_phase_hann(pelvis[:, :2], motion.fps, 0.5)
@@ -194,8 +272,16 @@ class _Body:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class _Way:
-    """The part's way, smoothed: place and velocity (T, 3) m and m/s, world; height (T,) m above the ground; speed (T,)
-    m/s, of the head and the chest against the pelvis: a jump is faster than the nod that meets the ball."""
+    """Smoothed trajectory of the part.
+
+    Attributes:
+        place: (T, 3) m, world frame.
+        velocity: (T, 3) m/s, world frame.
+        height: (T,) m above the ground.
+        speed: (T,) m/s; of head and chest relative to the pelvis, because a jump is faster than the nod that meets the
+            ball.
+        fps: frames per second.
+    """
 
     place: np.ndarray
     velocity: np.ndarray
@@ -205,6 +291,7 @@ class _Way:
 
     @staticmethod
     def of(place: np.ndarray, body: _Body, part: str, fps: float) -> "_Way":
+        """Smooth the part's positions (T, 3) m and derive its velocity, height and speed."""
         smooth = zero_phase_hann(place, fps, _SMOOTHING)
         velocity = _rate(smooth, fps)
         against = _rate(smooth - body.pelvis, fps) if part in ("head", "chest") else velocity
@@ -213,25 +300,27 @@ class _Way:
 
 
 def _other_foot(skeleton: Skeleton, positions: np.ndarray, side: str, fps: float) -> np.ndarray:
-    """(T,) m/s: how fast the foot is that does not strike."""
+    """Compute the speed (T,) m/s of the foot that does not strike."""
     limb = getattr(identify(skeleton), "left" if side == "right" else "right")
     place = positions[:, [limb.foot, limb.toe_or_foot]].mean(axis=1)
     return np.linalg.norm(_rate(zero_phase_hann(place, fps, _SMOOTHING), fps), axis=1)
 
 
 def _rate(values: np.ndarray, fps: float) -> np.ndarray:
-    """Central differences over time of (T, k), per second."""
+    """Differentiate values (T, k) over time by central differences, per second."""
     return np.gradient(values, axis=0) * fps
 
 
 def _peaks(values: np.ndarray) -> list[int]:
-    """Frames of `values` (T,) that are higher than their neighbours; of a level stretch its first."""
+    """Find the frames of `values` (T,) that are higher than their neighbours; of a plateau the first frame."""
     rising = values[1:-1] > values[:-2]
     return (np.flatnonzero(rising & (values[1:-1] >= values[2:])) + 1).tolist()
 
 
 def _apart(speed: np.ndarray, fps: float) -> list[int]:
-    """The fast frames; of those closer than _APART seconds only the faster (§3: the part's return after a hit)."""
+    """Find the fast frames; of those closer than _APART seconds only the fastest (section 3: the part's return after a
+    hit).
+    """
     kept: list[int] = []
     for frame in sorted(_peaks(speed), key=lambda frame: -speed[frame]):
         if all(abs(frame - other) >= _APART * fps for other in kept):
@@ -240,22 +329,27 @@ def _apart(speed: np.ndarray, fps: float) -> list[int]:
 
 
 def _threshold(height: np.ndarray, peaks: list[int], part: str) -> float:
-    """m: the height that divides the peaks into low and high best (Otsu 1979), at least a part's least rise above where
-    it usually is: a foot on the ground, head and chest of who stands."""
+    """Compute the height in m that best divides the peaks into low and high ones (Otsu 1979).
+
+    It is at least a part's least rise above its typical height: a foot on the ground, head and chest of a standing
+    person.
+    """
     usual = float(np.percentile(height, 50 if part in ("head", "chest") else 10))
     least = usual + _LEAST_RISE.get(part, 0.10)
     tops = np.sort(height[peaks])
     if len(tops) < 2:
         return least
+    # Otsu: for each cut of the sorted peaks, the means on both sides and the variance between them
     before = np.cumsum(tops)[:-1] / np.arange(1, len(tops))
     after = (tops.sum() - np.cumsum(tops)[:-1]) / np.arange(len(tops) - 1, 0, -1)
+    # between-class variance, without its constant factor
     spread = np.arange(1, len(tops)) * np.arange(len(tops) - 1, 0, -1) * (after - before) ** 2
     cut = int(np.argmax(spread))
     return max(least, float(0.5 * (tops[cut] + tops[cut + 1])))
 
 
 def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
-    """(first, last) of the hit motion around each high frame, those that overlap made one."""
+    """Find (first, last) of the hit motion around each high frame; overlapping ones are merged."""
     speed, lows = way.speed, [0, *_peaks(-way.height), len(way.height) - 1]
     spans: list[tuple[int, int]] = []
     for high in highs:
@@ -263,6 +357,7 @@ def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
             continue
         first = _lowest(speed, high, [low for low in reversed(lows) if low < high])
         last = _lowest(speed, high, [low for low in lows if low > high])
+        # the hit motion before it ends here at the latest
         if spans and first < spans[-1][1]:
             first = spans[-1][1]
         spans.append((first, last))
@@ -270,7 +365,15 @@ def _spans(way: _Way, highs: list[int]) -> list[tuple[int, int]]:
 
 
 def _lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
-    """Of the lowest frames on one side of `high`, nearest first, the first where the part has come to rest between."""
+    """Find, on one side of `high`, the nearest lowest frame by which the part has slowed down.
+
+    Args:
+        speed: (T,) m/s of the part.
+        high: the high frame.
+        lows: frames of lowest height on that side, nearest first.
+    Returns:
+        The first low whose speed is at most _SLOW of the highest speed between; the farthest low if there is none.
+    """
     for low in lows:
         between = speed[min(low, high) : max(low, high) + 1]
         if speed[low] <= _SLOW * between.max():
@@ -279,9 +382,12 @@ def _lowest(speed: np.ndarray, high: int, lows: list[int]) -> int:
 
 
 def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.ndarray | None) -> bool:
-    """Whether the part is faster than a step or the swing of an arm at this speed of the body. Feet that walk reach 2.7
-    times the body's speed and half a metre per second more, in a run 2.1 times; recorded kicks more than 4 times. A
-    foot that strikes is also faster than the one that stands (`other`, (T,) m/s): in a jump both go alike."""
+    """Whether the part is faster than a step or an arm's swing at this speed of the body.
+
+    Feet that walk reach 2.7 times the body's speed plus half a metre per second, in a run 2.1 times; recorded kicks
+    more
+    than 4 times. A striking foot is also faster than the supporting one (`other`, (T,) m/s): in a jump both are alike.
+    """
     key = span[0] + int(np.argmax(way.speed[span[0] : span[1] + 1]))
     if key in span or way.speed[key] < _LEAST_SPEED.get(part, 1.0):
         return False
@@ -295,6 +401,7 @@ def _is_hit(span: tuple[int, int], part: str, way: _Way, body: _Body, other: np.
 
 def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _Body,
                 key: int | None = None) -> HitMotion:
+    """Build the hit motion of a span of frames; `key` None: the fastest frame."""
     first, last = span
     key = first + int(np.argmax(way.speed[first : last + 1])) if key is None else key
     high = _high(way.height, first, key, last)
@@ -311,21 +418,24 @@ def _hit_motion(part: str, side: str, span: tuple[int, int], way: _Way, body: _B
 
 
 def _high(height: np.ndarray, first: int, key: int, last: int) -> int:
-    """The high frame beside the key: where the part rises to after it, or where it comes down from, as an arm that
-    throws."""
+    """Choose the high frame beside the key.
+
+    It lies after the key where the part rises to it, and before the key where the part comes down, as a throwing arm
+    does.
+    """
     before = first + int(np.argmax(height[first : key + 1]))
     after = key + int(np.argmax(height[key : last + 1]))
     return after if height[after] > height[key] + _RISES or height[after] >= height[before] else before
 
 
 def _fastest(speed: np.ndarray, first: int, last: int) -> int:
-    """The fast frame between two frames; the fastest one where speed only rises or falls there."""
+    """Find the fast frame between two frames; where speed only rises or falls there, the fastest frame."""
     inside = [first + 1 + frame for frame in _peaks(speed[first + 1 : last])]
     return max(inside or range(first, last + 1), key=lambda frame: speed[frame])
 
 
 def _between(motions, count: int) -> tuple[tuple[int, int], ...]:
-    """(first, last) of what lies between hit motions, before the first and after the last."""
+    """Find the (first, last) frames between hit motions, before the first and after the last one."""
     edges = [(-1, -1), *((one.first, one.last) for one in motions), (count, count)]
     found = [(a + 1, b - 1) for (_, a), (b, _) in zip(edges, edges[1:])]
     return tuple((first, last) for first, last in found if last > first)

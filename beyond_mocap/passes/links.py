@@ -1,8 +1,9 @@
-"""Poses as each body sees itself, and how alike every two frames of a library are (Ball handling §4 eq. 1).
+"""Poses in the body's own frame, and the distance between any two frames of a library (Ball handling, section 4, eq.
+1).
 
-The root stands over the origin and faces X. A player of a passing scene may leave any clip for any other between two
-strikes, and the path search weighs how alike the poses are against where the player has to go; so it gets eq. 1's poses
-of all frames: positions and velocities of the main bones, times their weights.
+In this frame the root is above the origin and faces X. Between two strikes a player of a passing scene may leave any
+clip for any other; the path search weighs the distance of the two poses against where the player has to go. It takes
+the terms of eq. 1 for all frames: positions and velocities of the main bones, times their weights.
 """
 
 from __future__ import annotations
@@ -20,15 +21,21 @@ from ..motion.motion import Motion, at_frames, pose_kinematics
 from . import kept
 from .pass_scene import BONES
 
-_FINE = 60.0
+_FINE = 60.0  # Hz: velocities are central differences over two steps of this rate
 
-_known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()
+_known: weakref.WeakKeyDictionary[Library, np.ndarray] = weakref.WeakKeyDictionary()  # library -> `measure_bones`
 
 
 @dataclass(frozen=True)
 class BoneWeights:
-    """The weights of eq. 1: of each of BONES' positions (without unit) and velocities (s). The feet count double,
-    because feet that slide over the ground are what eyes notice."""
+    """Weights of eq. 1 for the positions and velocities of BONES.
+
+    The feet count double because sliding feet are the most visible error.
+
+    Attributes:
+        position: one weight per bone, without unit.
+        velocity: one weight per bone, seconds.
+    """
 
     position: tuple[float, ...] = (1.0, 1.0, 1.0, 1.0, 2.0, 2.0)
     velocity: tuple[float, ...] = field(default=(0.1, 0.1, 0.1, 0.1, 0.2, 0.2))
@@ -37,24 +44,35 @@ class BoneWeights:
         for name in ("position", "velocity"):
             values = getattr(self, name)
             if len(values) != len(BONES) or not all(0.0 <= value < np.inf for value in values):
-                expected = f"{len(BONES)} numbers from 0 up: {', '.join(BONES)}"
-                raise InputError(f"weights of {name}", f"{values}", expected)
+                expected = f"{len(BONES)} numbers of 0 or more, one each for {', '.join(BONES)}"
+                raise InputError(f"{name} weights", f"{values}", expected)
 
 
 def aligned(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and velocities (N, 6, 3), m and m/s, of BONES at fractional `frames` (N,), seen from the body: the root
-    over the origin, facing X. Hands and head that a skeleton lacks are its chest."""
+    """Compute positions and velocities of BONES in the body's own frame: root above the origin, facing X.
+
+    A hand or head that the skeleton lacks takes the chest's place.
+
+    Args:
+        motion: the motion.
+        frames: (N,) fractional frames of the motion.
+    Returns:
+        positions: (N, 6, 3) m.
+        velocities: (N, 6, 3) m/s.
+    """
     step = motion.fps / _FINE
     before, here, after = (_bones(motion, frames + offset) for offset in (-step, 0.0, step))
+    # frames really between the two samples: fewer at the clip's ends, where samples are clamped
     taken = np.clip(frames + step, 0, len(motion) - 1) - np.clip(frames - step, 0, len(motion) - 1)
     velocity = (after[0] - before[0]) * (motion.fps / np.maximum(taken, 1e-9))[:, None, None]
     places, facing = here
+    # remove the heading and the root's place on the ground
     turn = quaternion.about_up(-facing)[:, None]
     return quaternion.rotate(turn, places - places[:, :1] * [1.0, 1.0, 0.0]), quaternion.rotate(turn, velocity)
 
 
 def _bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World positions (N, 6, 3) m of BONES, and the heading (N,) rad."""
+    """Compute world positions (N, 6, 3) m of BONES and the heading (N,) rad at fractional frames (N,)."""
     root, local = at_frames(motion, frames)
     places, _ = pose_kinematics(motion.skeleton, root, local)
     body = identify(motion.skeleton)
@@ -66,16 +84,30 @@ def _bones(motion: Motion, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def weigh_bones(library: Library, weights: BoneWeights = BoneWeights()) -> np.ndarray:
-    """(N, 12, 3) float32 of the library's N frames: the sum of the distances of two frames' rows is eq. 1, over the sum
-    of the usual weights of positions, so that it is about the distance in m of one bone. Kept beside the library's
-    cache."""
+    """Build the weighted rows of eq. 1 for every frame of a library.
+
+    The distance of two frames is the sum of the distances between their rows. It is divided by the sum of the default
+    position weights, so its size is roughly the distance of one bone in metres. Stored beside the library's cache.
+
+    Args:
+        library: the library, N frames.
+        weights: weights of eq. 1.
+    Returns:
+        (N, 12, 3) float32: six weighted positions, then six weighted velocities.
+    """
     scale = sum(BoneWeights().position)
     measure = np.array([*weights.position, *weights.velocity]) / scale
     return measure_bones(library) * measure.astype(np.float32)[:, None]
 
 
 def measure_bones(library: Library) -> np.ndarray:
-    """(N, 12, 3) float32: positions m, then velocities m/s, of `links.BONES` at every frame of the library."""
+    """Compute or load the positions and velocities of BONES at every frame of a library.
+
+    Args:
+        library: the library, N frames.
+    Returns:
+        (N, 12, 3) float32: positions in m, then velocities in m/s, in the body's own frame.
+    """
     if library not in _known:
         arrays = kept.load(library, "bones")
         if arrays is None or len(arrays["bones"]) != len(library.frames):

@@ -1,9 +1,9 @@
-"""The recipe of a rally that is played live (Ball handling §4): who has the ball does what the user has just done, and
-the ball goes to whom the user has chosen.
+"""Recipe for a rally that is played live (Ball handling, section 4).
 
-Until the user acts, everybody stands and the ball lies at the holder's feet. A pass is planned (`passes.planned`) from
-where all stand then, only the two that it concerns are moved anew, and it is laid into the running scene at the moment
-in which it is ready. The ball is stopped by who receives it; he is the next to act.
+The holder of the ball repeats the strike that the user has just done, and the ball goes to the player whom the user
+chose. Until the user acts, all players stand and the ball lies at the holder's feet. A pass is planned from where all
+players stand, only passer and receiver are rebuilt, and it is inserted into the running scene when it is ready. The
+receiver stops the ball and is the next to act.
 """
 
 from __future__ import annotations
@@ -29,25 +29,30 @@ from .passes import ball_of, ball_path, bone_weights, planned
 from .way import Stance
 
 LONG = 60.0
-"""Seconds that everybody goes on standing, if nobody acts."""
+"""Seconds that all players keep standing if the user does not act."""
 FADE = 0.4
-"""Seconds over which what somebody did gives way to what he does now."""
+"""Seconds over which a player's previous motion blends into the new one."""
 AHEAD = 0.6
-"""Metres from the holder to the ball at first."""
-_TAIL, _SWAY = 4.0, 2.5
-_STOPPED = 1.2
-_ROUNDS = 2
+"""Metres from the holder to the ball at the start."""
+_TAIL, _SWAY = 4.0, 2.5  # s: standing that is synthesized after a pass; its end that is repeated forth and back
+_STOPPED = 1.2  # s after the last strike at which the receiver can act
+_ROUNDS = 2  # plans before the final one, each moving the holder nearer to where the ball lies
 
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What somebody does. start: s on the scene's clock, of the motion's first frame."""
+    """The motion of one player of a rally.
+
+    Attributes:
+        start: s on the scene's clock of the motion's first frame.
+        motion: the motion.
+    """
 
     start: float
     motion: Motion
 
     def at(self, seconds: float) -> Stance:
-        """Where he stands and which way he faces at that second."""
+        """Compute where the player stands at `seconds` on the scene's clock."""
         frame = int(np.clip(round((seconds - self.start) * self.motion.fps), 0, len(self.motion) - 1))
         one = self.motion.frames(frame, frame + 1)
         return Stance(tuple(float(v) for v in one.root_positions[0, :2]), float(heading(one)[0]))
@@ -55,9 +60,17 @@ class Played:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Rally:
-    """A rally as it stands. scene: who plays; holder: who has the ball; players: name -> what he has done and does;
-    ball: its way on the scene's clock; start: s at which it began; free: s from which on the holder can act; passes:
-    how many there were."""
+    """The current state of a rally.
+
+    Attributes:
+        scene: the passing scene.
+        holder: name of the player who has the ball.
+        players: name -> motion up to now and from now on.
+        ball: its path on the scene's clock.
+        start: s at which the rally began.
+        ready_time: s from which on the holder can act.
+        passes: number of passes played.
+    """
 
     scene: PassScene
     holder: str
@@ -68,8 +81,14 @@ class Rally:
     passes: int = 0
 
     def after(self, piece: Piece, at: float) -> Rally:
-        """The rally with a pass that begins at `at` s, on the next frame: what each does fades over into it, what was
-        before stays."""
+        """Build the rally with a pass that begins on the next frame after `at` s.
+
+        Args:
+            live_pass: the pass.
+            at: s on the scene's clock.
+        Returns:
+            The rally: both players' motions blend into the pass, everything before it stays.
+        """
         at = self.start + np.ceil((at - self.start) * self.scene.fps - 1e-6) / self.scene.fps
         players = dict(self.players)
         for name, motion in piece.motions.items():
@@ -81,8 +100,18 @@ class Rally:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Piece:
-    """One pass from standing to standing, its own clock from 0. motions: of giver and receiver; ball; strike: s;
-    seconds: until the next can act; clip: which recording of the library the giver shows; warnings."""
+    """One pass from standing to standing, with its own clock from 0.
+
+    Attributes:
+        giver: name of the player who passes.
+        receiver: name.
+        motions: name -> motion, of passer and receiver.
+        ball: its path.
+        strike: s of the passer's strike.
+        seconds: s until the receiver can act.
+        clip: path of the recording that the passer's strike comes from.
+        warnings: what differs from the request.
+    """
 
     giver: str
     receiver: str
@@ -95,7 +124,20 @@ class Piece:
 
 
 def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, progress=None, cancelled=None) -> Rally:
-    """Everybody stands where the scene says, the ball before the holder. InputError for an unknown holder."""
+    """Start a rally: all players stand where the scene says, the ball is in front of the holder.
+
+    Args:
+        library: the library.
+        scene: the passing scene.
+        holder: name of the player who has the ball.
+        start: s on the scene's clock.
+        progress: receives the share of the work done and a short text.
+        cancelled: whether to stop.
+    Returns:
+        The rally.
+    Raises:
+        InputError: for an unknown holder.
+    """
     names = [player.name for player in scene.players]
     if holder not in names:
         raise InputError("holder", f"{holder!r}", f"one of {', '.join(names)}")
@@ -106,7 +148,7 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
     players = {}
     for number, player in enumerate(scene.players):
         if progress:
-            progress(number / len(names), f"{player.name} stands")
+            progress(number / len(names), f"{player.name} standing")
         stance = Stance(player.place, scene.facing(player.name))
         moved = player_motion(library, stance, (), ball=ball, ball_radius=radius, fps=scene.fps,
                               settings=_settings(scene), cancelled=cancelled)
@@ -116,10 +158,24 @@ def begin(library: Library, scene: PassScene, holder: str, start: float = 0.0, p
 
 def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: str, bounces: int = 0,
            progress: Callable[[float, str], None] | None = None, cancelled: Callable[[], bool] | None = None) -> Piece:
-    """The pass with which the holder answers a hit of the user: the library's most alike motion (eq. 2), to `target`.
+    """Build the pass with which the holder answers a hit of the user: the most similar motion of the library (eq. 2).
 
-    now: s, when all stand. InputError for a target that is nobody or the holder himself, or out of reach; NotInLibrary
-    where nothing strikes with that part; Cancelled."""
+    Args:
+        library: the library.
+        rally: the rally.
+        now: s on the scene's clock, when all players stand.
+        hit: the user's hit motion.
+        target: name of the receiver.
+        bounces: how often the ball bounces on its trajectory.
+        progress: receives the share of the work done and a short text.
+        cancelled: whether to stop.
+    Returns:
+        The pass.
+    Raises:
+        InputError: for a target that is unknown, the holder, or out of reach.
+        NotInLibrary: if no clip strikes with that part.
+        Cancelled: if `cancelled` returns True.
+    """
     stances = {name: played.at(now) for name, played in rally.players.items()}
     lies = rally.ball.positions[min(int(np.searchsorted(rally.ball.times, now)), len(rally.ball.times) - 1)]
     one = Pass(rally.holder, target, kind_of(hit), bounces=bounces, part=hit.part, side=hit.side,
@@ -147,13 +203,16 @@ def answer(library: Library, rally: Rally, now: float, hit: HitMotion, target: s
 
 
 def _settings(scene: PassScene) -> BodySettings:
+    """Build the players' settings of a scene."""
     weights = bone_weights(scene.weights)
     return BodySettings(transition=scene.transition, watch=scene.watch, seed=scene.seed, weights=weights)
 
 
 def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarray, progress, cancelled) -> PassPlan:
-    """The plan of the pass. The ball stays where it lies: the holder goes to where he strikes it; where his motion is
-    no kick from the ground, it hops up to him."""
+    """Plan the pass while the ball stays where it lies: the holder goes to where they strike it.
+
+    Where the holder's motion is no kick from the ground, the ball hops up to them.
+    """
     giver = scene.passes[0].giver
     try:
         for _ in range(_ROUNDS):
@@ -174,22 +233,23 @@ def _planned(library: Library, scene: PassScene, stance: Stance, lies: np.ndarra
 
 
 def _rolled(path: BallPath, lies: np.ndarray, strike: float) -> np.ndarray:
-    """The ball's places (T, 3) m, going over from where it lies to where it is struck: a few centimetres."""
+    """Compute the ball's positions (T, 3) m, blended from where it lies to where it is struck: a few centimetres."""
     away = lies - path.positions[0]
     return path.positions + (1.0 - smoothstep(path.times / max(strike, 1e-6)))[:, None] * away
 
 
 def _lasting(motion: Motion) -> Motion:
-    """A motion that ends standing, with its last seconds forth and back until LONG."""
+    """Extend a motion that ends standing by STANDING_SECONDS, playing its last seconds forth and back."""
     count = len(motion)
     sway = min(int(_SWAY * motion.fps), count - 1)
+    # a triangle wave over the last `sway` frames
     more = np.arange(1, int(LONG * motion.fps) + 1) % (2 * sway)
     frames = np.concatenate([np.arange(count), count - 1 - np.where(more <= sway, more, 2 * sway - more)])
     return replace(motion, root_positions=motion.root_positions[frames], rotations=motion.rotations[frames])
 
 
 def _going_on(before: Played, motion: Motion, at: float) -> Played:
-    """What was done before `at` s, then `motion`, over whose first FADE seconds the one fades into the other."""
+    """Continue a player's motion with `motion` from `at` s on, blended in over BLEND_SECONDS."""
     root, rotations = _faded(before, motion, at)
     past = np.clip(np.arange(round((at - before.start) * motion.fps)), 0, len(before.motion) - 1)
     root = np.concatenate([before.motion.root_positions[past], root])
@@ -198,7 +258,7 @@ def _going_on(before: Played, motion: Motion, at: float) -> Played:
 
 
 def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.ndarray]:
-    """Root positions (T, 3) and rotations (T, J, 4) of a motion that begins at `at` s, as faded."""
+    """Compute the root positions (T, 3) m and rotations (T, J, 4) of a motion that begins at `at` s, blended in."""
     count = min(int(FADE * motion.fps) + 1, len(motion))
     first = round((at - before.start) * motion.fps)
     frames = np.clip(np.arange(first, first + count), 0, len(before.motion) - 1)
@@ -211,7 +271,7 @@ def _faded(before: Played, motion: Motion, at: float) -> tuple[np.ndarray, np.nd
 
 
 def _on_from(before: BallPath | None, path: BallPath, at: float) -> BallPath:
-    """The ball's way so far and, from `at` s on, as `path` says, then lying for LONG seconds."""
+    """Join the ball's path so far with `path` from `at` s on, then let it lie for STANDING_SECONDS."""
     step = path.times[1] - path.times[0]
     more = int(round(LONG / step))
     times = np.concatenate([path.times, path.times[-1] + step * np.arange(1, more + 1)]) + at

@@ -1,9 +1,10 @@
-"""Who strikes the ball when, where, with which frame of which motion, and how it flies between (Ball handling §4).
+"""Who strikes the ball when, where and with which frame of which motion, and how it flies between (Ball handling,
+section 4).
 
-The paper lets the natural flights of all frames of a ball stretch choose the strike (`pass_choice`), and then solves
-the flight between two strikes exactly (Table 1, step 8); strikes follow one another as the ball travels. A ball lies on
-its part along the change of its velocity; that moves it a little, and with it the flights: after some rounds both fit.
-Strikes lie on whole frames of the output.
+As in the paper, the natural flights of all frames of a ball stretch choose the strike (`pass_choice`), then the flight
+between two strikes is solved exactly (Table 1, step 8); strikes follow one another as the ball travels. A ball touches
+its part along the change of its velocity. That moves the ball a little, and with it the flights, so both are solved in
+turns for some rounds. Strikes are on whole frames of the output.
 """
 
 from __future__ import annotations
@@ -23,27 +24,35 @@ from .pass_scene import GROUND, PassScene
 from .way import HitOrder, Stance
 
 LIMP = {"received": (0.9, 0.4), "dropped": (1.1, 0.9)}
-"""m/s ahead and up with which a ball goes that was stopped, or that slipped off."""
+"""m/s ahead and up with which a ball goes on that was stopped, or that slipped off."""
 
 
-# When each strike is: a chain of travels, long enough for who strikes next (Fig. 5).
+# -- the time of each strike: a chain of flights that leave the next player enough time (Fig. 5)
 
 
 LONGER = 6
-"""How many longer flights are tried at most where there is too little time."""
+"""Most longer flights that are tried where a player has too little time."""
 Need = Callable[[str, "HitOrder | Stance", HitOrder], float]
-"""Seconds that a player needs from one strike, or from standing, to the next."""
+"""Returns the seconds that a player needs from one strike, or from standing, to the next."""
 BESIDE = 0.45
-"""Metres by which a missed ball goes past the part."""
-ROUNDS = 5
+"""Metres by which a missed ball passes the part."""
+ROUNDS = 5  # rounds in which ball places and flights are solved in turns
 LEAP = 3.0
-"""m/s between two launches above which the ball takes quite another way, such as into the ground instead of up."""
+"""m/s between two launches above which the ball takes a different trajectory, such as into the ground instead of up."""
 NEARBY = np.array([1, -1, 2, -2, 3, -3, 5, -5, 8, -8, 12])
-"""Frames by which a flight may be longer or shorter than was best, where places have moved."""
+"""Frames that are added to a flight where the ball's places have moved."""
 
 
 def first_time(court: Court, order: HitOrder, need: Need) -> float:
-    """Seconds, a whole frame: the first strike, when who makes it is ready and the serve has come."""
+    """Compute the time of the first strike: when its player is ready and the serve has arrived.
+
+    Args:
+        problem: the scene with its sites.
+        order: the first strike.
+        need: seconds that a player needs.
+    Returns:
+        Seconds, a whole frame.
+    """
     site, fps = court.sites[0], court.scene.fps
     least = max(court.scene.lead_in, need(site.player, _standing(court, site.player), order))
     if court.scene.serve != GROUND:
@@ -53,8 +62,19 @@ def first_time(court: Court, order: HitOrder, need: Need) -> float:
 
 def in_time(court: Court, chain: list[Link], orders: Sequence[HitOrder], places: np.ndarray, first: float,
             need: Need) -> tuple[list[Link], list[str]]:
-    """The chain with flights long enough for who strikes next, and a line for everybody who still has too little
-    time."""
+    """Lengthen flights until every player has enough time for their strikes.
+
+    Args:
+        problem: the scene with its sites.
+        chain: the strikes.
+        orders: their orders.
+        places: (K, 3) m, the ball at each strike.
+        first: s of the first strike.
+        need: seconds that a player needs.
+    Returns:
+        chain: the strikes with their new travel times.
+        warnings: one line for each player who still has too little time.
+    """
     told: list[str] = []
     last_of: dict[str, int] = {}
     for number, site in enumerate(court.sites):
@@ -67,29 +87,38 @@ def in_time(court: Court, chain: list[Link], orders: Sequence[HitOrder], places:
         have = _time(chain, before, number, first)
         if needed - have > 0.5 / court.scene.fps:
             at = _time(chain, None, number, first)
-            told.append(f"{site.player} has {have:.1f} s before the strike at {at:.2f} s, and needs {needed:.1f} s")
+            told.append(f"{site.player} has {have:.1f} s before the strike at {at:.2f} s, but needs {needed:.1f} s")
         last_of[site.player] = number
     return chain, told
 
 
 def _standing(court: Court, name: str) -> Stance:
+    """Build the stance in which a player begins."""
     return Stance(court.scene.player(name).place, court.scene.facing(name))
 
 
 def _time(chain: Sequence[Link], before: int | None, number: int, first: float) -> float:
-    """Seconds from one strike, or from the beginning, to another."""
+    """Compute the seconds from one strike, or from the beginning, to another."""
     return sum(link.seconds for link in chain[before or 0 : number]) + (first if before is None else 0.0)
 
 
 def _longer(court: Court, chain: list[Link], which: Iterable[int], lack: float, places: np.ndarray) -> list[Link]:
-    """The chain with some flights longer, by the frame, as far as they can be; those whose seconds are asked stay."""
+    """Lengthen flights by whole frames where possible; passes with a requested time stay as they are.
+
+    Args:
+        which: indices of the flights that may be longer.
+        missing: seconds that are missing.
+        places: (K, 3) m, the ball at each strike.
+    """
     fps = court.scene.fps
     free = [number for number in which if court.passes[number].seconds is None]
     chain = list(chain)
     for done, number in enumerate(free):
+        # the missing time, shared evenly by the flights that are left
         frames = int(np.ceil(lack * fps / (len(free) - done) - 1e-6))
         if frames <= 0:
             break
+        # longest first, so that the first possible one takes the largest share of the missing time
         tried = chain[number].seconds + np.arange(frames, 0, -max(frames // LONGER, 1)) / fps
         aimed, good = court.flown(number, np.tile(places[number], (len(tried), 1)), places[number + 1], tried)
         if good.any():
@@ -101,10 +130,19 @@ def _longer(court: Court, chain: list[Link], which: Iterable[int], lack: float, 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Strike:
-    """One strike as it is played. order: what the body has to do. velocity_in, velocity_out (3,) m/s of the ball; spin
-    (3,) rad/s with which it leaves.
-    outcome: struck, received, missed or dropped. bounces, travel s: of the flight that goes out (0 for the last).
-    natural: the ways it was chosen from; None for the last."""
+    """One strike as it is played.
+
+    Attributes:
+        player: name.
+        order: what the body has to do.
+        velocity_in: (3,) m/s of the arriving ball.
+        velocity_out: (3,) m/s of the leaving ball.
+        spin: (3,) rad/s of the leaving ball.
+        outcome: "struck", "received", "missed" or "dropped".
+        bounces: of the flight that leaves.
+        travel: s of the flight that leaves; 0 for the last strike.
+        natural: the natural trajectories it was chosen from; None for the last strike.
+    """
 
     player: str
     order: HitOrder
@@ -119,8 +157,15 @@ class Strike:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PassPlan:
-    """strikes in order of time; flights: to the first strike, from each strike to the next, and from the last on;
-    seconds: of the whole scene; fps; warnings."""
+    """All strikes and flights of a scene.
+
+    Attributes:
+        strikes: in order of time.
+        flights: to the first strike, from each strike to the next, and after the last one.
+        seconds: length of the whole scene.
+        fps: frames per second.
+        warnings: what differs from the request.
+    """
 
     strikes: tuple[Strike, ...]
     flights: tuple[Flight, ...]
@@ -129,11 +174,15 @@ class PassPlan:
     warnings: tuple[str, ...]
 
     def orders(self, player: str) -> tuple[HitOrder, ...]:
-        """What one player has to do."""
+        """List the strikes that one player has to do."""
         return tuple(one.order for one in self.strikes if one.player == player)
 
     def flight_at(self, times: np.ndarray) -> np.ndarray:
-        """(N,): which flight the ball is in at `times` (N,) s; at a strike the one that goes out."""
+        """Find the flight that the ball is in at `times` (N,) s; at a strike the one that leaves.
+
+        Returns:
+            (N,) indices into `flights`.
+        """
         starts = [one.launch.time for one in self.flights]
         return np.maximum(np.searchsorted(starts, np.asarray(times, float) + 1e-9, side="right") - 1, 0)
 
@@ -141,10 +190,21 @@ class PassPlan:
 def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
                 cancelled: Callable[[], bool] | None = None,
                 progress: Callable[[float, str], None] | None = None) -> PassPlan:
-    """The chain of strikes and flights of a scene.
+    """Plan the chain of strikes and flights of a scene.
 
-    sites: of every strike, the last one where the last pass ends. need: seconds that a player needs from one strike, or
-    from standing, to the next. InputError where no human sends the ball so far, or over the net; Cancelled."""
+    Args:
+        scene: the passing scene.
+        sites: sites of every strike; the last one is where the last pass ends.
+        ball: the ball.
+        need: seconds that a player needs from one strike, or from standing, to the next.
+        cancelled: whether to stop.
+        progress: receives the share of the work done and a short text.
+    Returns:
+        The plan.
+    Raises:
+        InputError: if no human can send a ball that far, or over the net.
+        Cancelled: if `cancelled` returns True.
+    """
     report = progress or (lambda share, text: None)
     court = Court(scene, list(sites), ball, cancelled or (lambda: False))
     chain = choose(court, lambda share, text: report(0.8 * share, text))
@@ -162,6 +222,7 @@ def plan_passes(scene: PassScene, sites: Sequence[Site], ball: Ball, need: Need,
 
 
 def _order(court: Court, chain: Sequence[Link], number: int, time: float, places, normals) -> HitOrder:
+    """Build the order for one strike."""
     link, site = chain[number], court.sites[number]
     one = link.moment.hits[int(link.moment.which[0])]
     return HitOrder(time=time, clip=one.clip, hit=one.hit, strike_frame=float(link.moment.frame[0]),
@@ -171,6 +232,7 @@ def _order(court: Court, chain: Sequence[Link], number: int, time: float, places
 
 
 def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) -> tuple[Strike, ...]:
+    """Build all strikes with their times on whole frames."""
     fps = court.scene.fps
     times = np.round(np.cumsum([first, *(link.seconds for link in chain[:-1])]) * fps) / fps
     outcome = {"missed": "missed", "dropped": "dropped", "": "received"}[court.passes[-1].error]
@@ -183,6 +245,7 @@ def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) ->
             court.sites, orders, flown.arriving, flown.leaving, flown.spin, chain
         )
     ]
+    # what happens to the ball after the last strike
     limp = _limp(outcome, chain[-1], flown.arriving[-1])
     last = Strike(player=court.sites[-1].player, order=orders[-1], velocity_in=flown.arriving[-1], velocity_out=limp,
                   spin=np.zeros(3), outcome=outcome, bounces=0, travel=0.0, natural=None)
@@ -190,7 +253,7 @@ def _strikes(court: Court, chain: Sequence[Link], flown: Flown, first: float) ->
 
 
 def _limp(outcome: str, link: Link, arriving: np.ndarray) -> np.ndarray:
-    """(3,) m/s: how the ball goes on from the last one."""
+    """Compute the velocity (3,) m/s with which the ball goes on from the last strike."""
     if outcome == "missed":
         return arriving
     ahead, up = LIMP[outcome]
@@ -198,9 +261,9 @@ def _limp(outcome: str, link: Link, arriving: np.ndarray) -> np.ndarray:
 
 
 def _flights(court: Court, serve: Launch, strikes: Sequence[Strike], seconds: float) -> tuple[Flight, ...]:
-    """The flights to the first strike, between all, and from the last one on until `seconds`."""
+    """Simulate the flights to the first strike, between strikes, and after the last one until `seconds`."""
     flights = [fly(serve, court.ball, strikes[0].order.time - serve.time)]
-    sent = strikes[:-1] if strikes[-1].outcome == "missed" else strikes  # a ball that is missed flies on
+    sent = strikes[:-1] if strikes[-1].outcome == "missed" else strikes  # a missed ball flies on
     ends = [*(one.order.time for one in strikes[1 : len(sent)]), seconds]
     for one, end in zip(sent, ends):
         launch = Launch(one.order.time, np.array(one.order.ball), one.velocity_out, one.spin)
@@ -209,14 +272,15 @@ def _flights(court: Court, serve: Launch, strikes: Sequence[Strike], seconds: fl
 
 
 def _misses(court: Court, flown: Flown) -> list[str]:
+    """List a warning for each flight that does not reach the next strike."""
     return [
-        f"{court.name(number)}: the ball is {100 * miss:.0f} cm beside the next strike"
+        f"{court.name(number)}: the ball passes the next strike at {100 * miss:.0f} cm"
         for number, miss in enumerate(flown.missed) if miss > ON_TARGET
     ]  # fmt: skip
 
 
 def _ways(court: Court, chain: Sequence[Link], flown: Flown) -> list[str]:
-    """A line for every ball that flies through somebody, or into the net."""
+    """List a warning for each ball that flies through a player or into the net."""
     out = []
     seconds = np.array([link.seconds for link in chain[:-1]])
     ways = ways_of(flown.places[:-1], flown.leaving, flown.spin, seconds, court.ball)
@@ -230,9 +294,17 @@ def _ways(court: Court, chain: Sequence[Link], flown: Flown) -> list[str]:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Flown:
-    """The flights of K strikes. serve: the ball's launch before the first. places, normals (K, 3): the ball's at each
-    strike, m, and the way from part to ball. arriving (K, 3), leaving (K-1, 3) m/s and spin (K-1, 3) rad/s of the
-    balls; missed (K-1,): by how many metres each passes the next strike."""
+    """Flights of K strikes.
+
+    Attributes:
+        serve: launch of the ball before the first strike.
+        places: (K, 3) m, the ball at each strike.
+        normals: (K, 3) unit vectors from part to ball.
+        arriving: (K, 3) m/s of the balls.
+        leaving: (K-1, 3) m/s of the balls.
+        spin: (K-1, 3) rad/s of the leaving balls.
+        missed: (K-1,) m by which each flight misses the next strike.
+    """
 
     serve: Launch
     places: np.ndarray
@@ -244,15 +316,27 @@ class Flown:
 
 
 def laid(court: Court, chain: Sequence[Link]) -> tuple[np.ndarray, np.ndarray]:
-    """Places m and normals (K, 3) of the balls as if each part pushed its ball the way that it moves."""
+    """Compute places (K, 3) m and normals (K, 3) of the balls if each part pushes its ball in the direction of its
+    movement.
+    """
     ways = np.array([turned(link.moment.struck.velocity, link.facing)[0] for link in chain])
     return _laid(court, chain, unit_vectors(ways))
 
 
 def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) -> tuple[list[Link], Flown]:
-    """The chain, some of whose flights may be some frames longer or shorter, and its flights. places (K, 3) m: the
-    balls' at first; first: s of the first strike."""
-    serving = 0.0 if court.scene.serve == GROUND else min(first, LONGEST_SERVE)  # it sets out as the scene begins
+    """Solve flights and ball places together; some flights may become some frames longer or shorter.
+
+    Args:
+        problem: the scene with its sites.
+        chain: the K strikes.
+        places: (K, 3) m, first estimate of the balls' places.
+        first: s of the first strike.
+    Returns:
+        chain: the strikes with their new travel times.
+        flown: their flights.
+    """
+    serving = 0.0 if court.scene.serve == GROUND else min(first, LONGEST_SERVE)  # it starts as the scene begins
+    # ball places follow from flights, flights from places; this converges in a few rounds
     for _ in range(ROUNDS):
         leaving, spin, missed = _between(court, chain, places)
         _, arriving = _arriving(court, chain, places, begun=(first, serving), leaving=leaving, spin=spin)
@@ -266,13 +350,22 @@ def fitted(court: Court, chain: list[Link], places: np.ndarray, first: float) ->
 
 
 def _laid(court: Court, chain: Sequence[Link], normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the balls' places (K, 3) m on their parts toward `normals` (K, 3); both are returned."""
     each = enumerate(zip(chain, normals))
     return np.array([court.ball_on(number, link, normal) for number, (link, normal) in each]), normals
 
 
 def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Velocities and spins (K-1, 3) with which the balls leave, and by how many m (K-1,) they miss the next strike. One
-    that only quite another flight would bring there is taken so at the `last` only; before, it is told to miss."""
+    """Solve the flights between strikes.
+
+    A ball that only a very different flight would bring to the next strike takes that flight in the `last` round only;
+    before, it counts as a miss.
+
+    Returns:
+        velocities: (K-1, 3) m/s with which the balls leave.
+        spin: (K-1, 3) rad/s.
+        missed: (K-1,) m by which they miss the next strike.
+    """
     targets = np.array([_target(court, number, places, chain) for number in range(court.last)])
     seconds, spin = np.array([link.seconds for link in chain[:-1]]), _spins(court, chain, places, targets)
     bounces = np.array([one.bounces for one in court.passes])
@@ -282,6 +375,7 @@ def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarra
         near = np.array([chain[number].velocity for number in same])
         aimed = aim(places[same], targets[same], court.ball, seconds=seconds[same], bounces=int(count), spin=spin[same],
                     near=near)
+        # a jump of the launch velocity means another trajectory: keep the old one until the last round
         other = (np.linalg.norm(aimed.velocity - near, axis=1) > LEAP) & (not last)
         velocities[same] = np.where(other[:, None], near, aimed.velocity)
         missed[same] = np.where(other, np.inf, aimed.miss)
@@ -289,13 +383,13 @@ def _between(court: Court, chain, places, last: bool = False) -> tuple[np.ndarra
 
 
 def _spins(court: Court, chain, places, targets) -> np.ndarray:
-    """(K-1, 3) rad/s with which the balls leave."""
+    """Compute the spins (K-1, 3) rad/s with which the balls leave."""
     each = zip(places[:-1], targets, chain, court.sites)
     return np.array([spun(a[None], b, np.array([link.seconds]), court.ball, site.kind)[0] for a, b, link, site in each])
 
 
 def _target(court: Court, number: int, places: np.ndarray, chain: Sequence[Link]) -> np.ndarray:
-    """(3,) m: where the ball of a pass goes: to the next strike, or past it where it is missed."""
+    """Compute the target (3,) m of a pass: the next strike, or a point past it if the ball is missed."""
     place, site = places[number + 1], court.sites[number + 1]
     if court.passes[number].error != "missed":
         return place
@@ -308,15 +402,18 @@ def _target(court: Court, number: int, places: np.ndarray, chain: Sequence[Link]
 
 
 def _arriving(court: Court, chain, places, begun: tuple[float, float], leaving, spin) -> tuple[Launch, np.ndarray]:
-    """The serve, and the velocities (K, 3) m/s with which all balls come to their strikes. begun: s of the first
-    strike, and for how many the ball has flown by then."""
+    """Compute the serve and the velocities (K, 3) m/s with which all balls arrive.
+
+    Args:
+        serve_times: s of the first strike, and for how many s the ball has flown by then.
+    """
     serve, served = _served(court, places[0], *begun)
     seconds = np.array([link.seconds for link in chain[:-1]])
     return serve, np.concatenate([served[None], arrivals(places[:-1], leaving, spin, seconds, court.ball)])
 
 
 def _served(court: Court, place: np.ndarray, first: float, seconds: float) -> tuple[Launch, np.ndarray]:
-    """The ball's launch `seconds` before the first strike at `first` s, and its velocity (3,) m/s there."""
+    """Compute the launch `seconds` before the first strike at `first` s, and the ball's velocity (3,) m/s there."""
     if court.scene.serve == GROUND:
         return Launch(0.0, place, np.zeros(3)), np.zeros(3)
     start = court.serving_place(place)
@@ -326,7 +423,7 @@ def _served(court: Court, place: np.ndarray, first: float, seconds: float) -> tu
 
 
 def _within_reach(court: Court, chain: list[Link], places: np.ndarray, missed: np.ndarray) -> list[Link]:
-    """The chain with flights that miss some frames longer or shorter, where they then do not."""
+    """Change flights that miss by some frames, where they then reach the next strike."""
     chain, fps = list(chain), court.scene.fps
     for number in np.flatnonzero(missed > ON_TARGET):
         frames = round(chain[number].seconds * fps) + NEARBY

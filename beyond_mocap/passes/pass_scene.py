@@ -1,5 +1,7 @@
-"""A passing scene as it is asked for: who stands where, who passes to whom and how (docs/passes/passes.md has its form
-as a file)."""
+"""The request for a passing scene: who stands where, who passes to whom and how.
+
+docs/passes/passes.md describes its form as a file.
+"""
 
 from __future__ import annotations
 
@@ -20,30 +22,38 @@ SIDES = ("", "left", "right")
 ERRORS = ("", "missed", "dropped")
 GROUND = "ground"
 LEAST_APART = 0.5
-"""Metres between two players' places."""
+"""Least distance in metres between two players' places."""
 _DEFAULTS = defaults("passes")
 _ROWS = (*(setting("passes", name) for name in ("transition", "lead_in", "lead_out", "repeat", "net_height")),
          *(setting("passes.pass", name) for name in ("bounces", "seconds")), setting("passes.player", "height"))
 LIMITS = {**{row.name: (row.least, row.most) for row in _ROWS}, "weight": (0.0, 1000.0), "fps": (10.0, 240.0),
           "metres": (-1000.0, 1000.0), "seed": (-(2**63), 2**63 - 1)}
-"""Least and most of a scene's numbers."""
+"""Lowest and highest value of a scene's numbers."""
 MOST_PASSES, MOST_PLAYERS = 1000, 100
 BONES = ("root", "head", "left hand", "right hand", "left foot", "right foot")
-"""Bones that poses are compared by in eq. 1, and whose weights can be set."""
+"""Bones by which eq. 1 compares poses, and whose weights can be set."""
 RESERVED = ("ball", "strikes", "scene")
-"""Names that other files of a scene have."""
+"""Names that other files of a scene have, so that no player can have them."""
 LONGEST_TOOL, THICKEST_TOOL = 2.0, 0.5
-"""Metres that a tool in the hand has at most."""
+"""Greatest length and radius in metres of a tool in the hand."""
 FAR = 100.0
-"""Metres between two players, above which nobody passes."""
+"""Greatest distance in metres of a pass."""
 Place = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Player:
-    """Who takes part. place: (x, y) m where he stands. facing: rad from +x before the ball concerns him, None: toward
-    the middle of the others. part, side: what he strikes with, side one of SIDES. tool: in his hand. height: m, 0: as
-    the library's skeleton."""
+    """A player who takes part.
+
+    Attributes:
+        name: unique, also used for files.
+        place: (x, y) m, start position, world frame.
+        facing: heading before the ball concerns the player, rad from +x; None: toward the middle of the others.
+        part: part that strikes.
+        side: one of SIDES.
+        tool: what is in the hand.
+        height: body height in m; 0: as the library's skeleton.
+    """
 
     name: str
     place: Place
@@ -56,8 +66,14 @@ class Player:
 
 @dataclass(frozen=True)
 class Example:
-    """A stretch of a recording that a strike is to be like (eq. 2). clip: path below the library; start, end: s, end
-    None: as long as it is. hit: the hit motion itself, where it comes from elsewhere, such as a live stream."""
+    """A stretch of a recording that a strike has to resemble (eq. 2).
+
+    Attributes:
+        clip: path below the library.
+        start: s.
+        end: s; None: to the end of the recording.
+        hit: the hit motion itself, if it comes from elsewhere, such as a live stream.
+    """
 
     clip: str
     start: float = 0.0
@@ -67,9 +83,20 @@ class Example:
 
 @dataclass(frozen=True)
 class Pass:
-    """One pass. giver, receiver: names. kind: of KINDS. bounces: of the ball on its way. part, side: of the giver's
-    body, None: as he has it. seconds: that the ball travels, None: by the motion. at: (x, y) m where the receiver meets
-    it, None: where he stands. example: None: any strike of the kind. error: of ERRORS, what the receiver does wrong."""
+    """One pass.
+
+    Attributes:
+        giver: name of the player who passes.
+        receiver: name of the player who receives.
+        kind: one of KINDS.
+        bounces: number of bounces of the ball on its trajectory.
+        part: part of the passing player's body that strikes; None: as in Player.
+        side: its side; None: as in Player.
+        seconds: travel time of the ball; None: from the motion.
+        at: (x, y) m where the receiver meets the ball; None: where they stand.
+        example: recording to resemble; None: any strike of the kind.
+        error: one of ERRORS, what the receiver does wrong.
+    """
 
     giver: str
     receiver: str
@@ -85,7 +112,13 @@ class Pass:
 
 @dataclass(frozen=True)
 class Net:
-    """A net that stands on the ground between two places (x, y) m, `height` m high."""
+    """A net on the ground.
+
+    Attributes:
+        start: (x, y) m of one end.
+        end: (x, y) m of the other end.
+        height: m.
+    """
 
     start: Place
     end: Place
@@ -94,8 +127,16 @@ class Net:
 
 @dataclass(frozen=True)
 class Weights:
-    """What eq. 2 (speed, vectors, times: an example's likeness) and eq. 1 (position, velocity: a transition's) are
-    times, and bones: one of BONES -> what it is times in eq. 1."""
+    """Factors on the weights of eq. 2 (similarity to an example) and eq. 1 (transitions).
+
+    Attributes:
+        speed: factor in eq. 2.
+        vectors: factor in eq. 2.
+        times: factor in eq. 2.
+        position: factor in eq. 1.
+        velocity: factor in eq. 1.
+        bones: one of BONES -> factor in eq. 1.
+    """
 
     speed: float = 1.0
     vectors: float = 1.0
@@ -110,7 +151,12 @@ class Weights:
 
 @dataclass(frozen=True)
 class BallChoice:
-    """A ball: one of the known kinds, with other numbers where `changes` says so (`physics.Ball`'s own names)."""
+    """A ball.
+
+    Attributes:
+        kind: one of the known kinds.
+        changes: values that differ from the kind's, by the field names of `physics.Ball`.
+    """
 
     kind: str = "paper"
     changes: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
@@ -121,12 +167,19 @@ class BallChoice:
 
 @dataclass(frozen=True)
 class PassScene:
-    """What is asked. players; passes in their order. fps: of the output. serve: where the ball comes from first: a
-    player's name, (x, y, z) m, GROUND, or None: the player who would pass to the first one. directions: 8: strikes turn
-    in steps of 45 degrees; 0: any way. The settings table says what the other fields mean.
+    """The request for a passing scene. The settings table describes the fields that are not listed here.
 
-    InputError for what cannot be: two players on one spot or of one name, a pass to oneself or to somebody unknown,
-    passes that do not go on where the one before went, numbers outside LIMITS."""
+    Attributes:
+        players: the players.
+        passes: passes in their order.
+        fps: frames per second of the output.
+        serve: where the first ball comes from: a player's name, (x, y, z) m, GROUND, or None: the player who is
+            expected to pass to the first one.
+        directions: 8: strikes turn in steps of 45 degrees; 0: any heading.
+    Raises:
+        InputError: for two players at one place or with one name, a pass to oneself or to an unknown player, passes
+        that do not start where the one before ended, or numbers outside LIMITS.
+    """
 
     players: tuple[Player, ...]
     passes: tuple[Pass, ...]
@@ -153,12 +206,12 @@ class PassScene:
         _check_numbers(self)
 
     def player(self, name: str) -> Player:
-        """The player of a name."""
+        """Find a player by name."""
         return next(one for one in self.players if one.name == name)
 
     @property
     def order(self) -> tuple[Pass, ...]:
-        """All passes in their order, repeats too, up to the first that is meant to go wrong."""
+        """All passes in their order, with repeats, up to the first that is meant to go wrong."""
         out = []
         for one in self.passes * self.repeat:
             out.append(one)
@@ -167,7 +220,7 @@ class PassScene:
         return tuple(out)
 
     def facing(self, name: str) -> float:
-        """Radians in which a player faces before the ball concerns him."""
+        """Compute the heading in rad of a player before the ball concerns them."""
         player = self.player(name)
         if player.facing is not None:
             return player.facing
@@ -177,25 +230,37 @@ class PassScene:
 
 
 def number_within(value, name: str, where: str, whole: bool = False):
-    """`value` where it is a number within LIMITS[name]; InputError otherwise."""
+    """Check that a value is a number within LIMITS[name].
+
+    Args:
+        value: the value.
+        name: key of LIMITS.
+        where: place in the scene, for messages.
+        whole: whether it has to be a whole number.
+    Returns:
+        The value as int or float.
+    Raises:
+        InputError: if it is not.
+    """
     low, high = LIMITS[name]
     kind = "a whole number" if whole else "a number"
     good = isinstance(value, (int, float)) and not isinstance(value, bool)
-    good = good and low <= value <= high  # also of no NaN, and of whole numbers that no float can hold
+    good = good and low <= value <= high  # false for NaN; works for whole numbers too large for a float
     if not good or (whole and value != int(value)):
         raise InputError(where, _said(value), f"{kind} from {low:g} to {high:g}")
     return int(value) if whole else float(value)
 
 
 def _said(value) -> str:
-    """A value as it is told of, shortened: a whole number of a file may have hundreds of digits."""
+    """Format a value for messages, shortened: a whole number of a file may have hundreds of digits."""
     said = repr(value)
     return said if len(said) <= 40 else said[:37] + "..."
 
 
 def _check_players(players: tuple[Player, ...]) -> None:
+    """Check number, names, places, parts, tools and heights of the players."""
     if not 2 <= len(players) <= MOST_PLAYERS:
-        raise InputError("players", f"{len(players)} of them", f"2 to {MOST_PLAYERS}")
+        raise InputError("players", f"{len(players)} players", f"2 to {MOST_PLAYERS}")
     for number, one in enumerate(players):
         where = f"player {one.name!r}"
         _check_name(one.name, where)
@@ -213,18 +278,18 @@ def _check_players(players: tuple[Player, ...]) -> None:
 
 
 def _check_name(name: str, where: str) -> None:
-    """A player's name is also his files'."""
+    """Check a player's name, which is also used for files."""
     odd = not name.isprintable() or name != name.strip() or name.startswith(".") or set(name) & set('/\\:*?"<>|')
     if not name or odd or len(name) > 60 or name.casefold() in RESERVED:
-        expected = "up to 60 letters, digits, blanks between"
-        raise InputError(where, "a name that his files cannot have", expected, "rename him")
+        expected = "up to 60 letters, digits and spaces between them"
+        raise InputError(where, "a name that a file cannot have", expected, "rename the player")
 
 
 def _check_pair(one: Player, other: Player) -> None:
     if one.name.casefold() == other.name.casefold():
-        raise InputError("players", f"two of the name {one.name!r}", "a name for each, for their files")
+        raise InputError("players", f"two with the name {one.name!r}", "a different name for each")
     if math.dist(one.place, other.place) < LEAST_APART:
-        found = f"{other.name} and {one.name} {math.dist(one.place, other.place):.2f} m apart"
+        found = f"{other.name} and {one.name} are {math.dist(one.place, other.place):.2f} m apart"
         raise InputError("players", found, f"{LEAST_APART} m or more", "move one of them")
 
 
@@ -241,12 +306,13 @@ def _check_part(part: str, side: str, where: str) -> None:
 
 
 def _check_passes(scene: PassScene) -> None:
+    """Check the passes, and that each starts where the one before ended."""
     if not scene.passes:
         raise InputError("passes", "none", "at least one")
     number_within(scene.repeat, "repeat", "repeat", whole=True)
     if len(scene.passes) * scene.repeat > MOST_PASSES:
         count = len(scene.passes) * scene.repeat
-        raise InputError("passes", f"{count} in all", f"{MOST_PASSES} at most", "repeat fewer")
+        raise InputError("passes", f"{count} in total", f"{MOST_PASSES} at most", "use fewer repeats")
     names = [one.name for one in scene.players]
     for number, one in enumerate(scene.passes, start=1):
         _check_pass(one, f"pass {number}", names, scene)
@@ -254,18 +320,19 @@ def _check_passes(scene: PassScene) -> None:
     ends = [*scene.passes, *(scene.passes[:1] if scene.repeat > 1 else ())]
     for number, (before, after) in enumerate(zip(ends, ends[1:]), start=1):
         if after.giver != before.receiver:
-            found = f"{after.giver} has not got the ball"
+            found = f"{after.giver} does not have the ball"
             again = number == len(scene.passes)
             where = "pass 1 when repeated" if again else f"pass {number + 1}"
-            raise InputError(where, found, f"from {before.receiver}, to whom pass {number} went", "change one of them")
+            raise InputError(where, found, f"a pass from {before.receiver}, who gets pass {number}", "change either")
 
 
 def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> None:
+    """Check one pass: players, kind, error, numbers, example and distance."""
     for word, name in (("from", one.giver), ("to", one.receiver)):
         if name not in names:
             raise InputError(where, f"{word} {name!r}", f"one of {', '.join(names)}")
     if one.giver == one.receiver:
-        raise InputError(where, f"from {one.giver} to himself", "two players", "name another receiver")
+        raise InputError(where, f"{one.giver} is both passer and receiver", "two players", "choose another receiver")
     if one.kind not in KINDS:
         raise InputError(where, f"the kind {one.kind!r}", f"one of {', '.join(KINDS)}")
     if one.error not in ERRORS:
@@ -279,7 +346,7 @@ def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> No
     if one.example is not None:
         start, end = one.example.start, math.inf if one.example.end is None else one.example.end
         if not (math.isfinite(start) and 0.0 <= start < end):
-            raise InputError(where, f"an example from {start:g} to {end:g} s", "seconds from 0, the later one last")
+            raise InputError(where, f"an example from {start:g} to {end:g} s", "a start from 0 s and a later end")
     goal = one.at or scene.player(one.receiver).place
     far = math.dist(scene.player(one.giver).place, goal)
     if far > FAR:
@@ -288,7 +355,7 @@ def _check_pass(one: Pass, where: str, names: list[str], scene: PassScene) -> No
 
 
 def _check_meetings(scene: PassScene) -> None:
-    """Nobody goes to meet a ball where another one stands by then."""
+    """Check that no player meets a ball where another player stands at that time."""
     places = {one.name: one.place for one in scene.players}
     for number, one in enumerate(scene.passes, start=1):
         places[one.receiver] = one.at or places[one.receiver]
@@ -298,6 +365,7 @@ def _check_meetings(scene: PassScene) -> None:
 
 
 def _check_numbers(scene: PassScene) -> None:
+    """Check the numbers, weights, net and serve of a scene."""
     for name in ("fps", "transition", "lead_in", "lead_out"):
         number_within(getattr(scene, name), name, name)
     number_within(scene.seed, "seed", "seed", whole=True)
@@ -306,7 +374,7 @@ def _check_numbers(scene: PassScene) -> None:
         if not (isinstance(value, (int, float)) and 0.0 <= value <= 1.0):
             raise InputError(f"errors: {name}", f"{value!r}", "a number from 0 to 1")
     if scene.missed + scene.dropped > 1.0:
-        raise InputError("errors", f"{scene.missed:g} missed and {scene.dropped:g} dropped", "1 in all at most")
+        raise InputError("errors", f"{scene.missed:g} missed and {scene.dropped:g} dropped", "a sum of 1 at most")
     if scene.directions not in (0, 8):
         raise InputError("directions", f"{scene.directions!r}", "8, or 0 for any")
     for bone in scene.weights.bones:
@@ -326,10 +394,11 @@ def _check_net(net: Net) -> None:
         _check_place(place, "net")
     number_within(net.height, "net_height", "net: height")
     if math.dist(net.start, net.end) < 0.1:
-        raise InputError("net", f"{math.dist(net.start, net.end):.2f} m wide", "two places apart")
+        raise InputError("net", f"{math.dist(net.start, net.end):.2f} m wide", "0.1 m or more")
 
 
 def _check_serve(scene: PassScene) -> None:
+    """Check the serve: a known other player, or a place away from the first player."""
     serve = scene.serve
     if serve is None or serve == GROUND:
         return
@@ -342,12 +411,15 @@ def _check_serve(scene: PassScene) -> None:
     if len(serve) != 3 or not all(math.isfinite(v) and abs(v) <= LIMITS["metres"][1] for v in serve) or serve[2] < 0.0:
         raise InputError("serve", f"{serve}", "[x, y, z] in metres, not below the ground")
     if math.dist(serve[:2], scene.player(first).place) < LEAST_APART:
-        raise InputError("serve", f"{serve}, where {first} stands", f"{LEAST_APART} m away or more")
+        raise InputError("serve", f"{serve}, where {first} stands", f"a place {LEAST_APART} m away or more")
 
 
 def served_by(scene: PassScene) -> str:
-    """Who would pass to the first player: the last one of the passes that goes to him, else the last receiver, else the
-    first one of the others."""
+    """Find the player who is expected to serve to the first player.
+
+    The passer of the last pass that goes to them, otherwise the last receiver, otherwise the first of the other
+    players.
+    """
     first = scene.passes[0].giver
     to_him = [one.giver for one in scene.passes if one.receiver == first]
     others = [one.receiver for one in scene.passes if one.receiver != first]

@@ -1,6 +1,6 @@
-"""The recipe of a passing scene: several players keep a ball going (Ball handling).
+"""Recipe for a passing scene: several players keep a ball in play (Ball handling).
 
-`passes.pass_plan` says when, where and with what each of them strikes and how the ball flies; `bodies` moves each
+`plan_passes` gives time, place and means of each strike and the flights of the ball; `build_player_motion` moves each
 player; the ball's path is the flights, one after the other.
 """
 
@@ -33,23 +33,29 @@ from .strike_choice import Choice, StrikeMoments, strike_moments, unsaid
 from .way import HitOrder, Stance
 
 MOST_HITS = 24
-"""Hit motions that are looked at for one strike, those that suit its kind best."""
+"""Most hit motions that are tried for one strike; those that suit its kind best come first."""
 BALL_LIMITS: dict[str, Any] = {
     **{name: (setting("passes", name).least, setting("passes", name).most)
        for name in ("radius", "gravity", "linear_drag", "drag", "restitution")},
     "mass": (0.001, 20.0), "lift": ((0.0, 0.5, 0.0), (1.0, 10.0, 10.0)), "friction": (0.0, 5.0),
     "rolling": (0.01, 20.0), "spin_decay": (0.0, 20.0), "inertia": (0.1, 1.0),
 }  # fmt: skip
-"""Least and most of a ball's numbers."""
+"""Lowest and highest value of a ball's numbers."""
 PLANNED = 0.3
-"""Share of the whole work after which the plan stands."""
+"""Share of the whole work after which the plan is ready."""
 _SIDED = ("foot", "hand", "tool")
 
 
 @dataclass(frozen=True, eq=False)
 class PlayerPasses:
-    """One player of the scene. take: his motion, contacts and where its frames came from; gaps (K,) m between part and
-    ball at each of his strikes (NaN where he misses), moved (K,) m that the part was moved for it."""
+    """One player of a played scene.
+
+    Attributes:
+        name: the player's name.
+        take: motion, contacts and provenance.
+        gaps: (K,) m between part and ball at each of their strikes; NaN where they miss.
+        part_shifts: (K,) m by which the part was moved to meet the ball.
+    """
 
     name: str
     take: Take
@@ -59,8 +65,16 @@ class PlayerPasses:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Passes:
-    """A passing scene as it is played. plan: strikes and flights; ball: its path, kind the ball; players in the scene's
-    order; warnings: what could not be kept."""
+    """A passing scene as it is played.
+
+    Attributes:
+        scene: the request.
+        kind: the ball.
+        plan: strikes and flights.
+        ball: the ball's path.
+        players: in the scene's order.
+        warnings: what differs from the request.
+    """
 
     scene: PassScene
     kind: Ball
@@ -70,7 +84,7 @@ class Passes:
     warnings: tuple[str, ...]
 
     def gap(self, number: int) -> float:
-        """Metres between part and ball at a strike of the plan."""
+        """Measure the distance in m between part and ball at a strike of the plan."""
         one = self.plan.strikes[number]
         own = sum(other.player == one.player for other in self.plan.strikes[:number])
         return float(next(player for player in self.players if player.name == one.player).gaps[own])
@@ -78,10 +92,20 @@ class Passes:
 
 def passes(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
            cancelled: Callable[[], bool] | None = None) -> Passes:
-    """The scene played with the motions of a library. The same scene and library give the same bits.
+    """Play a scene with the motions of a library. The same scene and library give the same bits.
 
-    InputError for a part that the skeleton lacks, and for passes that no human can give; NotInLibrary where nothing in
-    the library strikes with a part; Cancelled."""
+    Args:
+        library: the library.
+        scene: the request.
+        progress: receives the share of the work done and a short text.
+        cancelled: whether to stop.
+    Returns:
+        The scene as it is played.
+    Raises:
+        InputError: for a part that the skeleton lacks, and for passes that no human can give.
+        NotInLibrary: if no clip of the library strikes with a part.
+        Cancelled: if `cancelled` returns True.
+    """
     report, stop = progress or (lambda share, text: None), cancelled or (lambda: False)
     plan = planned(library, scene, lambda share, text: report(PLANNED * share, text), stop)
     path = ball_path(plan)
@@ -99,21 +123,22 @@ def passes(library: Library, scene: PassScene, progress: Callable[[float, str], 
 
 
 def list_unlabelled_strikes(library: Library, plan: PassPlan) -> list[str]:
-    """A line for each part but the foot that strikes with motions whose words say nothing of it."""
+    """List a warning for each part except the foot that strikes with motions without such labels."""
     clips: dict[str, set[str]] = {}
     for strike in plan.strikes:
         if strike.order.part in ("head", "chest", "hand", "tool") and unsaid(library, strike.order):
             clips.setdefault(strike.order.part, set()).add(library.clips[strike.order.clip].path)
     return [
-        f"no words of the library tell of strikes with the {part}; what moves it like one is taken from "
+        f"no labels of the library name strikes with the {part}; motions that look like one are taken from "
         f"{', '.join(sorted(paths))}"
         for part, paths in clips.items()
     ]
 
 
 def _part_of(report, number: int, players: tuple[Player, ...]):
-    """The progress of one player's motion among all."""
+    """Build the progress callback of one player's motion within the whole work."""
     def told(share: float, text: str) -> None:
+        """Report the share of this player's work."""
         report(PLANNED + (1.0 - PLANNED) * (number + share) / len(players), f"{players[number].name}: {text}")
 
     return told
@@ -121,7 +146,18 @@ def _part_of(report, number: int, players: tuple[Player, ...]):
 
 def planned(library: Library, scene: PassScene, progress: Callable[[float, str], None] | None = None,
             cancelled: Callable[[], bool] | None = None) -> PassPlan:
-    """Strikes and flights of a scene alone, for live editing. Errors as for `passes`."""
+    """Plan the strikes and flights of a scene, without motions, for live editing.
+
+    Args:
+        library: the library.
+        scene: the request.
+        progress: receives the share of the work done and a short text.
+        cancelled: whether to stop.
+    Returns:
+        The plan.
+    Raises:
+        InputError, NotInLibrary, Cancelled: as `synthesize_passes`.
+    """
     scene = _with_chance(scene)
     ball = ball_of(scene)
     sizes = {player.name: size_of(player, library) for player in scene.players}
@@ -130,7 +166,11 @@ def planned(library: Library, scene: PassScene, progress: Callable[[float, str],
 
 
 def ball_of(scene: PassScene) -> Ball:
-    """The scene's ball. InputError for an unknown kind, and for numbers that no ball has."""
+    """Build the scene's ball.
+
+    Raises:
+        InputError: for an unknown kind, an unknown value, or values outside BALL_LIMITS.
+    """
     choice = scene.ball
     if choice.kind not in BALLS:
         raise InputError("ball", f"the kind {choice.kind!r}", f"one of {', '.join(BALLS)}")
@@ -146,12 +186,12 @@ def ball_of(scene: PassScene) -> Ball:
 
 
 def size_of(player: Player, library: Library) -> float:
-    """How many times as large as the library's skeleton a player is."""
+    """Compute the size of a player over that of the library's skeleton."""
     return player.height / stature(library.skeleton) if player.height else 1.0
 
 
 def bone_weights(weights: Weights) -> BoneWeights:
-    """The weights of eq. 1 that a scene asks for: so many times the usual ones."""
+    """Build the weights of eq. 1 for a scene: its factors times the default weights."""
     own = BoneWeights()
     factors = [weights.bones.get(bone, 1.0) for bone in BONES]
     return BoneWeights(
@@ -161,7 +201,7 @@ def bone_weights(weights: Weights) -> BoneWeights:
 
 
 def ball_path(plan: PassPlan) -> BallPath:
-    """The ball at every frame of the scene, and how it has turned."""
+    """Build the ball's path: position and rotation at every frame of the scene."""
     times = np.arange(int(round(plan.seconds * plan.fps)) + 1) / plan.fps
     which = plan.flight_at(times)
     positions, rotations, turned = np.empty((len(times), 3)), np.empty((len(times), 4)), np.array([1.0, 0.0, 0.0, 0.0])
@@ -169,15 +209,16 @@ def ball_path(plan: PassPlan) -> BallPath:
         own = which == number
         positions[own] = flight.at(times[own])
         way = flight.rotations(np.append(times[own], flight.end))
+        # each flight starts with the rotation that the one before ended with
         rotations[own], turned = multiply(way[:-1], turned), multiply(way[-1], turned)
     return BallPath(times, positions, np.ones(len(times), bool), rotations)
 
 
-# -- what each strike can be made with
+# -- the motions that each strike can use
 
 
 def _with_chance(scene: PassScene) -> PassScene:
-    """The scene with the errors that chance brings: the first ball that is missed or dropped ends the rally."""
+    """Apply random errors: the first ball that is missed or dropped ends the rally."""
     order = list(scene.order)
     random = np.random.default_rng([scene.seed & (2**64 - 1), 1])
     for number, one in enumerate(order):
@@ -191,7 +232,7 @@ def _with_chance(scene: PassScene) -> PassScene:
 
 
 def _sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[Site]:
-    """Where and with what each strike is made."""
+    """Build the site of each strike."""
     reach = _Reach(library, scene, sizes)
     places = {player.name: np.array(player.place, float) for player in scene.players}
     out = []
@@ -204,7 +245,7 @@ def _sites(library: Library, scene: PassScene, sizes: dict[str, float]) -> list[
 
 
 class _Reach:
-    """What the players can strike with; each question is answered once."""
+    """The motions with which players can strike; each result is stored."""
 
     def __init__(self, library: Library, scene: PassScene, sizes: dict[str, float]):
         self.library, self.scene, self.sizes = library, scene, sizes
@@ -212,7 +253,14 @@ class _Reach:
         self._moments: dict[tuple, StrikeMoments] = {}
 
     def site(self, name: str, place: np.ndarray, one: Pass | None, number: int) -> Site:
-        """A strike of one player; `one`: the pass that goes out, `number`: which pass an error names."""
+        """Build the site of a strike of one player.
+
+        Args:
+            name: the player.
+            place: (2,) m where they strike.
+            one: the pass that leaves; None for the last strike.
+            number: number of the pass that an error names.
+        """
         player = self.scene.player(name)
         part = (one and one.part) or player.part
         side = player.side if one is None or one.side is None else one.side
@@ -227,6 +275,7 @@ class _Reach:
                     size=size, moments=moments, asked=one)
 
     def _reached(self, part, side, tool, size: float, kind: str, example) -> StrikeMoments:
+        """Collect the moments with which a body of some size can strike."""
         key = (part, side, tool, size, kind, example)
         if key not in self._moments:
             if (part, tool) not in self._choices:
@@ -240,22 +289,23 @@ class _Reach:
             if not hits:
                 with_what = f"the {side} {part}" if wanted else part
                 others = self._others()
-                other = f"ask for another part ({', '.join(others)}) or " if others else ""
+                other = f"choose another part ({', '.join(others)}) or " if others else ""
                 message = f"no clip of the library strikes with {with_what}; {other}add clips that do"
                 raise NotInLibrary(message, others)
             self._moments[key] = strike_moments(self.library, hits, tool, size)
         return self._moments[key]
 
     def _others(self) -> tuple[str, ...]:
-        """Parts with which something in the library strikes."""
+        """List the parts with which clips of the library strike."""
         return tuple(part for part in ("foot", "head", "chest", "hand") if Choice.of(self.library, part).hits)
 
     def _weights(self) -> MatchWeights:
+        """Build the weights of eq. 2."""
         own, asked = MatchWeights(), self.scene.weights
         return MatchWeights(own.speed * asked.speed, own.vector * asked.vectors, own.time * asked.times)
 
     def _example(self, example, part: str, side: str, tool: Tool | None) -> HitMotion:
-        """The strongest hit motion in a stretch of a recording, or the one that is given."""
+        """Find the strongest hit motion in a stretch of a recording, or return the given one."""
         if example.hit is not None:
             return example.hit
         clip = next((clip for clip in self.library.clips if clip.path == example.clip and not clip.mirrored), None)
@@ -267,27 +317,28 @@ class _Reach:
         last = len(motion) if example.end is None else int(np.ceil(example.end * motion.fps)) + 1
         if first > len(motion) - 3:
             found = f"{example.clip} from {example.start:g} s"
-            raise InputError("example", found, f"seconds up to {motion.duration:.2f}")
+            raise InputError("example", found, f"a time up to {motion.duration:.2f} s")
         found = strongest(motion.frames(first, min(last, len(motion))), part, side, tool)
         if found is None:
-            raise InputError("example", f"no strike by {part} in {example.clip} there", "a stretch with a whole strike")
+            raise InputError("example", f"no strike by {part} there in {example.clip}", "a stretch with a whole strike")
         return found
 
 
 def _needs(library: Library, sizes: dict[str, float]):
-    """Seconds that a player needs between two strikes; a larger one moves as the library does, only larger."""
+    """Build the function that gives the seconds a player needs; a larger body moves as the library does, scaled."""
     def need(player: str, before: Stance | HitOrder, after: HitOrder) -> float:
+        """Seconds that a player needs from one strike, or from standing, to the next."""
         return least_seconds(library, _sized(before, sizes[player]), _sized(after, sizes[player]))
 
     return need
 
 
-# -- the bodies
+# -- the players' motions
 
 
 def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, player: Player, progress,
             cancelled) -> PlayerMotion:
-    """One player's motion in his own size; the work is done in the library's."""
+    """Build one player's motion in their own size; the work is done in the library's size."""
     size = size_of(player, library)
     orders = [_sized(order, size) for order in plan.orders(player.name)]
     stance = _sized(Stance(player.place, scene.facing(player.name)), size)
@@ -303,7 +354,7 @@ def _played(library: Library, scene: PassScene, plan: PassPlan, path: BallPath, 
 
 
 def _sized(order, size: float):
-    """What a player `size` times as large as the library has to do, in the library's size."""
+    """Convert an order or stance of a player `size` times as large as the library to the library's size."""
     if size == 1.0:
         return order
     if isinstance(order, Stance):
@@ -313,6 +364,7 @@ def _sized(order, size: float):
 
 
 def _grown_plan(plan, size: float, height: float):
+    """Scale the track of a take's plan to the player's size."""
     track = plan.track
     ball = None if track.ball is None else track.ball * size
     return replace(plan, track=replace(track, positions=track.positions * size, ball=ball), height=height)

@@ -1,4 +1,4 @@
-"""The files of a passing scene (docs/passes/passes.md): SCENE.json, samples of it, and the strikes as a table."""
+"""Files of a passing scene (docs/passes/passes.md): SCENE.json, samples of it, and the strikes as a table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..files.whole import atomic_write
 from .pass_scene import BallChoice, Example, Net, Pass, PassScene, Player, Weights
 
 LARGEST = 10_000_000
-"""Bytes of a file above which it is no scene."""
+"""Bytes above which a file is not read as a scene."""
 _OF_PASS = ("kind", "bounces", "part", "side", "seconds", "at", "example", "error")
 
 SAMPLES: dict[str, dict] = {
@@ -73,13 +73,29 @@ COLUMNS = ("time_s", "frame", "player", "kind", "part", "side", "clip", "clip_fr
 
 
 def read_scene(path: str | os.PathLike) -> PassScene:
-    """The scene that a file holds. InputError, which names the file and the place in it, for whatever is wrong."""
+    """Read a scene from a file.
+
+    Args:
+        path: a SCENE.json.
+    Returns:
+        The scene.
+    Raises:
+        InputError: names the file and the place in it that is wrong.
+    """
     return parse_scene(utf8(path, "a SCENE.json", LARGEST), str(path))
 
 
 def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
-    """The scene in a text, or in the object that it stands for; `name` stands before what is wrong with it, as
-    InputError."""
+    """Parse a scene from a text, or from the JSON object of one.
+
+    Args:
+        content: the text or object.
+        name: name of the scene in error messages.
+    Returns:
+        The scene.
+    Raises:
+        InputError: names the place that is wrong.
+    """
     whole = object_of(said, name, "docs/passes/passes.md") if isinstance(said, str) else said
     try:
         return _scene(whole)
@@ -88,12 +104,12 @@ def parse_scene(said: str | dict, name: str = "scene") -> PassScene:
 
 
 def scene_text(scene: PassScene) -> str:
-    """The scene as `read_scene` reads it."""
+    """Format a scene as the text of a SCENE.json."""
     return json.dumps(scene_dict(scene), indent=1, ensure_ascii=False) + "\n"
 
 
 def scene_dict(scene: PassScene) -> dict:
-    """The scene as the object that stands in a file; what is as usual is left out."""
+    """Build the JSON object of a scene, without default values."""
     usual = PassScene(scene.players, scene.passes)
     out: dict = {"players": list(map(_player_out, scene.players)), "passes": list(map(_pass_out, scene.passes))}
     for name in ("repeat", "fps", "seed", "transition", "lead_in", "lead_out", "directions", "watch"):
@@ -114,6 +130,7 @@ def scene_dict(scene: PassScene) -> dict:
 
 
 def _player_out(one: Player) -> dict:
+    """Build the JSON object of a player, without default values."""
     out: dict = {"name": one.name, "place": list(one.place)}
     if one.facing is not None:
         out["facing"] = _in_degrees(one.facing)
@@ -126,13 +143,14 @@ def _player_out(one: Player) -> dict:
 
 
 def _pass_out(one: Pass) -> dict:
+    """Build the JSON object of a pass, without default values."""
     out: dict = {"from": one.giver, "to": one.receiver}
     for name in _OF_PASS:
         value = getattr(one, name)
         if value != getattr(Pass, name):
             out[name] = list(value) if name == "at" else value
     out.pop("example", None)
-    if one.example is not None and one.example.hit is None:  # a hit motion of elsewhere has no file
+    if one.example is not None and one.example.hit is None:  # other hit motions have no recording
         told = {"clip": one.example.clip, "from": one.example.start, "to": one.example.end}
         out["example"] = {name: value for name, value in told.items() if value is not None}
     return out
@@ -142,6 +160,7 @@ def _pass_out(one: Pass) -> dict:
 
 
 def _scene(whole) -> PassScene:
+    """Build a scene from its JSON object."""
     read: dict[str, Callable] = {"players": _list_of(_player), "repeat": whole_number, "fps": number,
                                  "seed": whole_number, "ball": _ball, "net": _net, "serve": _serve,
                                  "transition": number, "lead_in": number, "lead_out": number,
@@ -169,7 +188,7 @@ def _pass(value, where: str, usual: Mapping) -> Pass:
 
 
 def _settings(value, where: str) -> dict:
-    """What a pass may say beside its players."""
+    """Parse the settings of a pass, without its players."""
     read = {"kind": text, "bounces": whole_number, "part": text, "side": text, "seconds": number, "at": _place,
             "example": _example, "error": text}
     check_names(value, where, read, ())
@@ -194,6 +213,7 @@ def _tool(value, where: str) -> Tool:
 
 
 def _ball(value, where: str) -> BallChoice:
+    """Parse the ball: a kind, or an object with a kind and values that differ from it."""
     if isinstance(value, str):
         return BallChoice(value)
     check_object(value, where)
@@ -212,15 +232,18 @@ def _net(value, where: str) -> Net:
 
 
 def _serve(value, where: str):
+    """Parse the serve: a position, or a name or "ground"."""
     return _triple(value, where) if isinstance(value, (list, tuple)) else text(value, where)
 
 
 def _errors(value, where: str) -> dict[str, Any]:
+    """Parse the probabilities of errors."""
     check_names(value, where, ("missed", "dropped"), ())
     return {name: number(one, f"{where}: {name}") for name, one in value.items()}
 
 
 def _weights(value, where: str) -> Weights:
+    """Parse the weights of eq. 1 and eq. 2."""
     names = [entry.name for entry in fields(Weights)]
     check_names(value, where, names, ())
     bones = value.get("bones", {})
@@ -230,6 +253,7 @@ def _weights(value, where: str) -> Weights:
 
 
 def _list_of(read: Callable) -> Callable:
+    """Build a reader for a list whose entries `read` parses."""
     def lines(value, where: str) -> tuple:
         if not isinstance(value, (list, tuple)):
             raise InputError(where, shown(value), "a list [...]")
@@ -240,12 +264,13 @@ def _list_of(read: Callable) -> Callable:
 
 
 def _angle(value, where: str) -> float:
+    """Parse an angle in degrees to rad; larger angles are reduced to half a turn."""
     degrees = number(value, where)
     return math.radians(degrees if abs(degrees) <= 360.0 else math.remainder(degrees, 360.0))
 
 
 def _in_degrees(angle: float) -> float:
-    """Degrees that are read as just this angle (radians) again, where there are such."""
+    """Find the degrees from which reading gives exactly this angle (rad) again, if there are any."""
     near = math.degrees(angle)
     tried = (near + ulps * math.ulp(near) for ulps in (0, 1, -1, 2, -2, 3, -3))
     return next((degrees for degrees in tried if math.radians(degrees) == angle), near)
@@ -260,7 +285,12 @@ def _triple(value, where: str) -> tuple[float, float, float]:
 
 
 def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
-    """Writes one row for each strike, in their order; a strike has every one of COLUMNS, None for an empty cell."""
+    """Write one row for each strike, in their order.
+
+    Args:
+        path: the CSV file.
+        strikes: rows; each has every one of COLUMNS, None for an empty cell.
+    """
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -270,6 +300,7 @@ def write_strikes(path: str | os.PathLike, strikes: Iterable[Mapping]) -> None:
 
 
 def _cell(value) -> str:
+    """Format a value as a CSV cell: 0/1 for bools, six digits for numbers, empty for None and NaN."""
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):

@@ -1,9 +1,8 @@
-"""What a passing scene asks of one body (where it stands; when, where and how it strikes), and where the player goes:
-as recorded around each hit motion, and between them quietly to where the next one begins.
+"""Orders to one player of a passing scene (where they begin; when, where and how they strike), and the player's path.
 
-A hit motion is laid so that its strike is at the ordered place and facing; its recorded run-up and run-out belong to it
-as far as there is time. What is left between two of them is walked as soon as the first one is over, and then the
-player stands.
+A hit motion is placed so that its strike is at the ordered place and facing. Its recorded run-up and run-out belong to
+it where there is time. The distance between two hit motions is walked as soon as the first one is over; then the player
+stands still.
 """
 
 from __future__ import annotations
@@ -23,18 +22,18 @@ from ..motion.humanoid import heading_from_positions
 from ..motion.motion import at_frames, pose_kinematics
 
 LEAD, TIMELY = 1.6, 0.4
-"""Seconds of run-up and run-out that are taken from the recording at most, and m/s that one of them is worth."""
+"""Most seconds of run-up or run-out that are taken from the recording, and m/s that one of these seconds is worth."""
 SLOW = 0.3
 """m/s below which a run-up has not begun, and a run-out is over."""
 CROUCHED, LIFTED = 3.0, 0.25
-"""m/s of unrest that a metre below or above the usual height of the hips is, and that a foot in the air is."""
+"""m/s of unrest for each metre of the hips below or above their typical height, and for each foot in the air."""
 WALK, HASTE = 1.1, 2.2
-"""m/s at which he goes from one place to the next where time allows, and where it does not."""
+"""m/s from one place to the next: where time allows, and where it does not."""
 SPEEDING = 1.6
-"""m/s^2 at which he comes to rest and sets out."""
-_SETTLE = 0.4  # s that setting out and stopping take beside the way itself
-_ROOM = 1.25  # times what he needs, from which on he stands between two hits
-_SHARE = 0.7  # of the time between two hits that run-out and run-up may take
+"""m/s^2 with which the player stops and sets out."""
+_SETTLE = 0.4  # s that setting out and stopping add to the time for the distance
+_ROOM = 1.25  # times the needed time, from which on the player stands still between two hits
+_SHARE = 0.7  # of the time between two hits: most that run-out and run-up take
 
 
 if TYPE_CHECKING:
@@ -43,7 +42,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stance:
-    """Where a player stands and which way he faces: place (2,) m on the ground of his root, facing rad from +x."""
+    """Where a player stands.
+
+    Attributes:
+        place: (2,) m, root on the ground, world frame.
+        facing: heading, rad from +x.
+    """
 
     place: tuple[float, ...]
     facing: float
@@ -51,13 +55,23 @@ class Stance:
 
 @dataclass(frozen=True, eq=False)
 class HitOrder:
-    """One strike.
+    """Order for one strike.
 
-    time: s. clip: index into the library's clips; hit: the hit motion, frames in the clip's own rate; strike_frame: the
-    one that strikes, in that rate. place (2,) m and facing rad: of the root on the ground and of the heading at the
-    strike. ball (3,) m: the ball's centre then; normal (3,): unit, the way from the part to the ball. part, side: of
-    `contact.PARTS` or a joint's name. tool: what is in the hand. kind: toss, pass, attack or receive. touches: whether
-    he meets the ball; who misses it plays on as recorded."""
+    Attributes:
+        time: s.
+        clip: index into the library's clips.
+        hit: the hit motion, frames in the clip's own rate.
+        strike_frame: fractional frame of the strike, in that rate.
+        place: (2,) m, root on the ground at the strike, world frame.
+        facing: heading at the strike, rad from +x.
+        ball: (3,) m, centre of the ball at the strike, world frame.
+        normal: (3,) unit vector from the part to the ball, world frame.
+        part: one of `contact.PARTS` or a joint's name.
+        side: "left", "right", or "".
+        tool: what is in the hand.
+        kind: "toss", "pass", "attack" or "receive".
+        touches: whether the player meets the ball; a player who misses it plays on as recorded.
+    """
 
     time: float
     clip: int
@@ -76,9 +90,18 @@ class HitOrder:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Placed:
-    """A hit motion laid on the pitch: its clip turned by `turn` rad about the vertical, so that at the strike its root
-    is at the ordered place; one second of the scene is one of the clip. first, last: frames of the clip, in its own
-    rate, between which it is played: the hit motion, and as much of its run-up and run-out as there is time for."""
+    """A hit motion placed on the pitch: its clip turned about the vertical so that its root is at the ordered place.
+
+    One second of the scene is one second of the clip.
+
+    Attributes:
+        library: the library of the clip.
+        order: the order that it carries out.
+        turn: rad about the vertical, from clip to world.
+        clip_place: (2,) m, the clip's root at the strike, clip frame.
+        first: first frame that is played, in the clip's own rate: the hit motion with its run-up.
+        last: last frame that is played: the hit motion with its run-out.
+    """
 
     library: Library
     order: HitOrder
@@ -89,7 +112,7 @@ class Placed:
 
     @classmethod
     def of(cls, library: Library, order: HitOrder) -> Placed:
-        """The hit motion as ordered, alone."""
+        """Place the hit motion of an order, without run-up and run-out."""
         motion = library.clips[order.clip].motion
         root, local = at_frames(motion, np.array([order.strike_frame]))
         places, _ = pose_kinematics(motion.skeleton, root, local)
@@ -99,17 +122,17 @@ class Placed:
                    last=float(order.hit.last))
 
     def with_leads(self, into: float, out: float) -> Placed:
-        """The same with so many seconds of run-up and run-out."""
+        """Copy it with `into` seconds of run-up and `out` seconds of run-out."""
         return replace(self, first=self.first - into * self._fps, last=self.last + out * self._fps)
 
     @property
     def start(self) -> float:
-        """Second in which the hit motion begins."""
+        """Second of the scene at which it begins."""
         return self.order.time + (self.first - self.order.strike_frame) / self._fps
 
     @property
     def end(self) -> float:
-        """Second in which it ends."""
+        """Second of the scene at which it ends."""
         return self.order.time + (self.last - self.order.strike_frame) / self._fps
 
     @property
@@ -117,25 +140,45 @@ class Placed:
         return self.library.clips[self.order.clip].motion.fps
 
     def path(self, times: np.ndarray) -> np.ndarray:
-        """(N, 2) m: the clip's path without sway at seconds (N,)."""
+        """Compute the path without sway.
+
+        Args:
+            times: (N,) s of the scene.
+        Returns:
+            (N, 2) m, world frame.
+        """
         values = self._at(times, self.library.frames.path)
         return self.order.place + quaternion.turned_level(values - self.own_place, np.full(len(values), self.turn))
 
     def heading(self, times: np.ndarray) -> np.ndarray:
-        """(N,) rad: where the body faces at seconds (N,)."""
+        """Compute the heading.
+
+        Args:
+            times: (N,) s of the scene.
+        Returns:
+            (N,) rad, world frame.
+        """
         return self._at(times, self.library.frames.heading[:, None])[:, 0] + self.turn
 
     def velocity(self, time: float) -> np.ndarray:
-        """(2,) m/s of the path at a second."""
+        """Compute the path's velocity (2,) m/s, world frame, at `time` s of the scene."""
         step = 1.0 / self.library.fps
         ends = self.path(np.array([time - step, time + step]))
         return (ends[1] - ends[0]) / (2.0 * step)
 
     def lead(self, way: int) -> float:
-        """Seconds, at most LEAD, of the recorded run-up (way -1) or run-out (1) beside the hit motion: up to where the
-        body is at rest, or nearest to it, where a second is worth TIMELY m/s."""
+        """Measure the recorded run-up or run-out, at most LONGEST_LEAD seconds.
+
+        It reaches to where the body is at rest, or nearest to rest; each second of it is worth LEAD_WORTH m/s.
+
+        Args:
+            direction: -1 for the run-up, 1 for the run-out.
+        Returns:
+            Seconds.
+        """
         frames, order, fps = self.library.frames, self.order, self.library.fps
         count = frames.count[order.clip]
+        # edge of the hit motion, converted from the clip's rate to the library's
         edge = (self.first if way < 0 else self.last) * fps / self._fps
         at = np.arange(int(round(edge)), -1 if way < 0 else count, way)[: int(LEAD * fps) + 1]
         at = at[(at >= 0) & (at < count)]
@@ -145,8 +188,11 @@ class Placed:
         return int(np.argmin(unrest + TIMELY * np.arange(len(at)) / fps)) / fps
 
     def _unrest(self) -> np.ndarray:
-        """(L,) m/s: how far the clip's body is from standing at each of the library's frames: as fast as it goes, over
-        the ground and up or down, as low or high, and with a foot in the air."""
+        """Measure how far the clip's body is from standing still at each of the library's frames, (L,) m/s.
+
+        The sum of its speed over the ground, its speed up or down, its height below or above the usual, and feet in the
+        air.
+        """
         frames, clip = self.library.frames, self.order.clip
         own = slice(frames.first[clip], frames.first[clip] + frames.count[clip])
         height = frames.root[own, 2]
@@ -155,7 +201,9 @@ class Placed:
         return frames.speed[own] + np.abs(rising) + CROUCHED * np.abs(height - np.median(height)) + lifted
 
     def _at(self, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Values (L, K) of the library's frames at seconds (N,): linear, held at the clip's ends."""
+        """Interpolate values (L, K) of the library's frames at seconds (N,) of the scene; constant beyond the clip's
+        ends.
+        """
         frames, clip = self.library.frames, self.order.clip
         own = self.order.strike_frame + (np.asarray(times) - self.order.time) * self._fps
         own = own * self.library.fps / self._fps
@@ -165,11 +213,21 @@ class Placed:
 
 
 def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[Placed]:
-    """The hit motions of one player as ordered, in the order of time, with run-up and run-out; start: second in which
-    he begins. None is in the other's way: of the time between two they take _SHARE at most."""
+    """Place the hit motions of one player with run-up and run-out.
+
+    Neighbours do not overlap: run-out and run-up take at most _LEAD_SHARE of the time between two hit motions.
+
+    Args:
+        library: the library.
+        orders: orders of one player in order of time.
+        start: second of the scene at which the player begins.
+    Returns:
+        The placed hit motions, in the same order.
+    """
     hits = [Placed.of(library, order) for order in orders]
     leads = [[hit.lead(-1), hit.lead(1)] for hit in hits]
     ends, starts = [start, *(hit.end for hit in hits)], [*(hit.start for hit in hits), np.inf]
+    # gap `number` lies before hit `number`: the run-out of the hit before and the run-up of this one share it
     for number, (end, begin) in enumerate(zip(ends, starts)):
         out = leads[number - 1][1] if number else 0.0
         into = leads[number][0] if number < len(hits) else 0.0
@@ -183,15 +241,27 @@ def placed(library: Library, orders: Sequence[HitOrder], start: float) -> list[P
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """positions (T, 2) m of the path without sway; facing (T,) rad within the hit motions, unwrapped the short way
-    round from each to the next, NaN between them."""
+    """Path of a player over a scene.
+
+    Attributes:
+        positions: (T, 2) m, path without sway, world frame.
+        facing: (T,) rad within the hit motions, unwrapped the short way from each to the next; NaN between them.
+    """
 
     positions: np.ndarray
     facing: np.ndarray
 
 
 def way(stance: Stance, hits: Sequence[Placed], times: np.ndarray) -> Way:
-    """A player's way at seconds `times` (T,); hits in the order of time. He begins at his stance."""
+    """Build a player's path.
+
+    Args:
+        stance: where the player begins.
+        hits: placed hit motions in order of time.
+        times: (T,) s of the scene.
+    Returns:
+        The path at these times.
+    """
     positions, facing = np.tile(np.array(stance.place, float), (len(times), 1)), np.full(len(times), np.nan)
     facing[0] = stance.facing
     before, turned = (float(times[0]), np.array(stance.place, float), np.zeros(2)), stance.facing
@@ -216,8 +286,18 @@ def way(stance: Stance, hits: Sequence[Placed], times: np.ndarray) -> Way:
 
 
 def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
-    """(N, 2) m at seconds (N,) between two states: to rest, over to where he sets out, and there he waits; or straight
-    over where there is no time for that."""
+    """Compute the path between two states.
+
+    The player stops, walks to where they set out again, and waits there; or goes straight over if there is no time for
+    that.
+
+    Args:
+        times: (N,) s between the two states.
+        before: (s, place (2,) m, velocity (2,) m/s).
+        after: (s, place (2,) m, velocity (2,) m/s).
+    Returns:
+        (N, 2) m.
+    """
     (start, place, leaves), (end, goal, comes) = before, after
     stop, go = stopping(leaves), stopping(comes)
     rest, ready = place + 0.5 * leaves * stop, goal - 0.5 * comes * go
@@ -237,12 +317,12 @@ def walked(times: np.ndarray, before: State, after: State) -> np.ndarray:
 
 
 def stopping(velocity: np.ndarray) -> float:
-    """Seconds in which he comes to rest from a velocity (2,) m/s, or takes it up."""
+    """Compute the seconds in which the player stops from a velocity (2,) m/s, or reaches it."""
     return max(float(np.linalg.norm(velocity)) / SPEEDING, 0.05)
 
 
 def needed(before: State, after: State) -> float:
-    """Seconds that the way between two states asks for in haste."""
+    """Compute the seconds that the path between two states takes in a hurry."""
     stop, go = stopping(before[2]), stopping(after[2])
     apart = np.linalg.norm(after[1] - 0.5 * after[2] * go - before[1] - 0.5 * before[2] * stop)
     return stop + go + float(apart) / HASTE + _SETTLE

@@ -1,1 +1,1 @@
-"""Parametric gaits, kicks and throws; recordings with known answers."""
+"""Synthetic motion: parametric gaits, kicks, throws and other moves; recordings with ground truth."""

@@ -1,7 +1,7 @@
-"""A way to go, planned ahead: how fast, where to, facing where, and in step with what.
+"""The plan of a gait: speed, path, heading and stride phase at every moment.
 
-`plan` turns wanted speeds, turns and directions into the moments of a `Course`; feet (`gait.footsteps`), trunk and arms
-in `gait` all read from it.
+`plan_gait` turns requested speeds, turns and directions into the moments of a `GaitPlan`; feet, trunk and arms in
+`gait` all read from it.
 """
 
 from __future__ import annotations
@@ -17,22 +17,31 @@ from ..motion.retargeting.neutral import Neutral
 from . import gait_tables as tables
 from .gait_tables import at_speed
 
-# the plan reaches this many seconds beyond both ends, so that stances which cross them are known; less for one who runs
-# all the time, from this speed on, metres per second
+# the plan extends this many seconds beyond both ends, so that stances which cross them are known; less for a body that
+# runs all the time, that is from this speed in m/s on
 _PAD, _RUNNERS_PAD, _RUNS = 2.5, 1.9, 2.0
-# feet are planned at this rate or a multiple of it
+# Hz: feet are planned at this rate or more, a multiple of the output's rate
 _PLAN_RATE = 120.0
 
 
 @dataclass(frozen=True, kw_only=True)
 class GaitStyle:
-    """What makes one walker differ from another, all relative to the published figures.
+    """Differences between walkers, all relative to the published figures.
 
-    cadence: factor on steps per second (longer or shorter strides). bounce, arm_swing, twist (shoulders against
-    pelvis): factors. lean, head: radians added to the trunk's forward lean and the head's nod. abduct, elbow: radians
-    added to how far arms are held away and bent. width: metres added between the feet. toe_out: radians added. crouch:
-    radians added to the knees' flexion in stance. life: factor on breathing, sway and the small unevenness from stride
-    to stride."""
+    Attributes:
+        cadence: factor on steps per second (longer or shorter strides).
+        bounce: factor on the vertical movement of the hips.
+        arm_swing: factor.
+        twist: factor on the turn of shoulders against pelvis.
+        lean: rad added to the trunk's forward lean.
+        head: rad added to the head's nod.
+        abduct: rad added to how far the arms are held away.
+        elbow: rad added to the elbows' flexion.
+        width: m added between the feet.
+        toe_out: rad added to the outward turn of the feet.
+        crouch: rad added to the knees' flexion in stance.
+        life: factor on breathing, sway and the small variation from stride to stride.
+    """
 
     cadence: float = 1.0
     bounce: float = 1.0
@@ -50,12 +59,20 @@ class GaitStyle:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Course:
-    """A way planned over N moments, `pad` of them before the first and after the last frame that is asked for.
+    """A gait planned over N moments, `pad` of them before the first and after the last requested frame.
 
-    times (N,): seconds, 0 at the first frame asked for. speed (N,): m/s. gear (N,): the same for an adult's leg, which
-    is what the tables are asked with. direction (N,): travel relative to heading. heading (N,). path (N, 2): metres.
-    acceleration (N, 2): m/s^2 of the path, smoothed over a step. phase (N,): strides; the left foot lands at whole
-    numbers, the right one half a stride later. stride: every how many moments a frame is asked for."""
+    Attributes:
+        times: (N,) s, 0 at the first requested frame.
+        speed: (N,) m/s.
+        adult_speed: (N,) m/s, the same speed scaled to an adult's leg, with which the tables are read.
+        direction: (N,) rad, travel relative to the heading.
+        heading: (N,) rad.
+        path: (N, 2) m.
+        acceleration: (N, 2) m/s^2 of the path, smoothed over a step.
+        phase: (N,) strides; the left foot lands at whole numbers, the right one half a stride later.
+        pad: number of moments before the first and after the last requested frame.
+        stride: number of moments from one requested frame to the next.
+    """
 
     times: np.ndarray
     speed: np.ndarray
@@ -77,7 +94,16 @@ class Course:
 def plan(
     speed, duration, fps: float, neutral: Neutral, *, phase=0.0, turn_rate=0.0, direction=0.0, style=GaitStyle(), seed=0
 ) -> Course:
-    """The way that `gait` goes; parameters as there."""
+    """Plan a gait.
+
+    Args:
+        speed, duration, fps, phase, turn_rate, direction, style, seed: as for `build_gait`.
+        neutral: neutral stance of the body.
+    Returns:
+        The plan at a multiple of `fps`, _PLAN_RATE or more.
+    Raises:
+        InputError: for speeds below 0 or above 9.5 m/s, or arrays of different lengths.
+    """
     count = _count(speed, duration, fps, turn_rate, direction)
     stride = int(np.ceil(_PLAN_RATE / fps))
     rate = fps * stride
@@ -103,21 +129,39 @@ def plan(
 
 
 def stride_frequency(gear: np.ndarray, direction: np.ndarray, turn_rate: np.ndarray) -> np.ndarray:
-    """Strides per second (T,) for an adult at `gear` (T,) m/s; more when going backward or sideways or turning on the
-    spot."""
+    """Compute the stride frequency of an adult.
+
+    It is higher when going backward or sideways, or when turning on the spot.
+
+    Args:
+        adult_speed: (T,) m/s.
+        direction: (T,) rad, travel relative to the heading.
+        turn_rate: (T,) rad/s.
+    Returns:
+        (T,) strides per second.
+    """
     usual = at_speed("frequency", gear) * (1.0 + 0.22 * np.sin(0.5 * direction) ** 2 + 0.5 * np.sin(direction) ** 2)
     on_the_spot = 1.0 - quintic_step(gear / 1.8)
     return np.hypot(usual, on_the_spot * turn_rate / 1.3)
 
 
 def wander(times: np.ndarray, seed: int, period: float) -> np.ndarray:
-    """A slow aimless wave (N,) of about unit size: four sines around `period` seconds with seeded phases."""
+    """Compute a slow random wave of roughly unit size: four sines around `period` seconds with seeded phases.
+
+    Args:
+        times: (N,) s.
+        seed: of the phases.
+        period: s.
+    Returns:
+        (N,) values.
+    """
     random = np.random.default_rng(seed)
     rates, phases = np.array([0.6, 0.9, 1.35, 1.9]) / period, random.uniform(0.0, 2.0 * np.pi, 4)
     return np.sin(2.0 * np.pi * rates * times[:, None] + phases) @ np.array([0.5, 0.45, 0.35, 0.25])
 
 
 def _count(speed, duration, fps, turn_rate, direction) -> int:
+    """Find the number of requested frames; InputError if duration and arrays disagree."""
     lengths = {np.size(v) for v in (speed, turn_rate, direction) if np.ndim(v)}
     if duration is not None:
         lengths.add(int(round(duration * fps)) + 1)
@@ -127,10 +171,12 @@ def _count(speed, duration, fps, turn_rate, direction) -> int:
 
 
 def _at(values, times: np.ndarray, fps: float, count: int) -> np.ndarray:
+    """Interpolate one value or values (count,) of the frames to times (T,) s."""
     values = np.broadcast_to(np.asarray(values, dtype=float), (count,))
     return np.interp(times, np.arange(count) / fps, values)
 
 
 def _integral(values: np.ndarray, rate: float, zero: int) -> np.ndarray:
+    """Integrate values (T,) over time by the trapezoidal rule; the result is 0 at index `zero`."""
     total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]))]) / rate
     return total - total[zero]

@@ -1,8 +1,9 @@
-"""Where and when feet stand, and how they travel between: planted while they stand, the heel first, the toes last.
+"""Stances of the feet and their movement between stances: in contact they roll from the heel to the toes.
 
-A foot's life is a row of stances. During one its sole rolls over heel, ball and toe tip without sliding (the rockers of
-Perry 1992, "Gait analysis"); between two it follows the published angles of a swinging leg, bent so that it leaves and
-lands where the stances say, with their speed."""
+A foot's movement is a sequence of stances. In a stance its sole rolls over heel, ball and toe tip without sliding (the
+rockers of Perry 1992, "Gait analysis"). Between two stances it follows the published angles of a swinging leg, bent so
+that it leaves and lands where the stances are, with their speed.
+"""
 
 from __future__ import annotations
 
@@ -15,9 +16,9 @@ from ..base.time_series import interpolate
 from ..motion.retargeting.neutral import Neutral
 from . import gait_tables as tables
 
-# beyond this pitch the ball of the foot leaves the ground and the toe tip stays
+# rad of pitch beyond which the ball of the foot leaves the ground and the toe tip stays
 _TOE_LIFTS = np.radians(42.0)
-# a step this long (metres, for an adult) is a full one: shorter ones roll and lift less
+# m for an adult: a step this long is a full one; shorter ones roll and lift less
 _FULL_STEP = 0.55
 
 
@@ -25,9 +26,15 @@ _FULL_STEP = 0.55
 class Footsteps:
     """The K stances of one foot in order of time.
 
-    side: 0 left, 1 right. on, off (K,): seconds. place (K, 2): metres, below the ankle of the flat foot. yaw (K,):
-    radians. speed (K,): m/s of travel for an adult's leg, which picks the way of rolling. direction (K,): travel
-    relative to the foot, radians."""
+    Attributes:
+        side: 0 left, 1 right.
+        on: (K,) s at which the foot lands.
+        off: (K,) s at which it leaves the ground.
+        place: (K, 2) m, below the ankle of the flat foot, world frame.
+        yaw: (K,) rad, direction of the foot.
+        speed: (K,) m/s of travel for an adult's leg, which selects how the foot rolls.
+        direction: (K,) rad, travel relative to the foot.
+    """
 
     side: int
     on: np.ndarray
@@ -38,23 +45,29 @@ class Footsteps:
     direction: np.ndarray
 
     def current(self, times: np.ndarray) -> np.ndarray:
-        """Index (T,) of the stance that is under way or was the last one at `times` (T,)."""
+        """Find the stance at each of `times` (T,): the current one, or the last one before it."""
         return np.clip(np.searchsorted(self.on, times, side="right") - 1, 0, len(self.on) - 2)
 
     def standing(self, times: np.ndarray) -> np.ndarray:
-        """Whether the foot is on the ground at `times`: (T,) bool."""
+        """Whether the foot is in contact with the ground at `times`: (T,) bool."""
         return times <= self.off[self.current(times)]
 
     def step_size(self, scale: float) -> np.ndarray:
-        """Share (K-1,) of a full step that lies between each stance and the next; turning on the spot counts too."""
+        """Compute the share (K-1,) of a full step between each stance and the next; turning on the spot counts too."""
         moved = np.linalg.norm(np.diff(self.place, axis=0), axis=1) / scale
         return quintic_step((moved + 0.3 * np.abs(np.diff(self.yaw))) / _FULL_STEP)
 
 
 @dataclass(frozen=True, eq=False)
 class FootPath:
-    """ankle (T, 3) metres, world; pitch, yaw, bend (T,) radians: sole (toes down positive), direction, toes (up
-    positive)."""
+    """Movement of one foot over T moments.
+
+    Attributes:
+        ankle: (T, 3) m, world frame.
+        pitch: (T,) rad of the sole, toes down positive.
+        yaw: (T,) rad, direction of the foot.
+        bend: (T,) rad of the toes, up positive.
+    """
 
     ankle: np.ndarray
     pitch: np.ndarray
@@ -63,8 +76,16 @@ class FootPath:
 
 
 def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutral) -> FootPath:
-    """The foot at `share` (T,) of its stances `which` (T,): it rolls over heel, ball and toe tip, none of which
-    slides."""
+    """Compute the foot within its stances: it rolls over heel, ball and toe tip, none of which slides.
+
+    Args:
+        steps: the stances.
+        which: (T,) index of the stance.
+        share: (T,) share of the stance that has passed.
+        neutral: neutral stance of the body.
+    Returns:
+        The foot at these T moments.
+    """
     sizes = steps.step_size(neutral.leg / tables.LEG)
     before = np.concatenate([sizes[:1], sizes])[which]
     after = np.concatenate([sizes, sizes[-1:]])[which]
@@ -80,8 +101,11 @@ def stand(steps: Footsteps, which: np.ndarray, share: np.ndarray, neutral: Neutr
 
 
 def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    """Forward rolls heel to toe; backward the other way round and less (T); sideways the heel hardly leaves the
-    ground."""
+    """Compute the pitch (T,) rad of the sole for a direction of travel.
+
+    Forward the foot rolls from heel to toe, backward the other way round and less (source T); sideways the heel hardly
+    leaves the ground.
+    """
     ahead, back = np.maximum(np.cos(direction), 0.0) ** 2, np.maximum(-np.cos(direction), 0.0) ** 2
     forward_roll = tables.stance_pitch(share, speed)
     backward_roll = tables.stance_pitch(1.0 - share, speed)
@@ -93,17 +117,16 @@ def _directed_pitch(share: np.ndarray, speed: np.ndarray, direction: np.ndarray)
 
 
 def _roll(pitch: np.ndarray, tip_pitch: np.ndarray, neutral: Neutral, side: int) -> tuple[np.ndarray, np.ndarray]:
-    """How far ahead of its flat place and how high above the ground (T,), (T,) metres the ankle is when the sole
-    pitches."""
+    """Compute how far the ankle is ahead of its flat place and above the ground, (T,) m each, when the sole pitches."""
     ball_ahead, drop = neutral.ball[side, 0], -neutral.ball[side, 2]
     ball_up = neutral.ankle_height - drop
-    # on the ball (and, beyond, on the toe tip)
+    # toes down: the foot turns about its ball and, beyond _TOE_LIFT_PITCH, about the toe tip
     tip = neutral.tip
     lifted_ahead = ball_ahead + tip * (1.0 - np.cos(tip_pitch))
     lifted_up = ball_up + tip * np.sin(tip_pitch)
     ahead = lifted_ahead - ball_ahead * np.cos(pitch) + drop * np.sin(pitch)
     up = lifted_up + ball_ahead * np.sin(pitch) + drop * np.cos(pitch)
-    # on the heel
+    # toes up: the foot turns about its heel
     heel_ahead = -neutral.heel + neutral.heel * np.cos(pitch) + neutral.ankle_height * np.sin(pitch)
     heel_up = -neutral.heel * np.sin(pitch) + neutral.ankle_height * np.cos(pitch)
     return np.where(pitch >= 0.0, ahead, heel_ahead), np.where(pitch >= 0.0, up, heel_up)
@@ -113,9 +136,18 @@ def travel(
     steps: Footsteps, times: np.ndarray, hip: np.ndarray, heading: np.ndarray, neutral: Neutral,
     thigh_shank: tuple[float, float],
 ) -> FootPath:
-    """The whole way of one foot at `times` (T,), given its hip joint (T, 3) and the body's heading (T,) there.
+    """Compute the whole movement of one foot.
 
-    thigh_shank: bone lengths, metres. Times have to be evenly spaced."""
+    Args:
+        steps: the stances.
+        times: (T,) s, evenly spaced.
+        hip: (T, 3) m, hip joint, world frame.
+        heading: (T,) rad of the body.
+        neutral: neutral stance of the body.
+        thigh_shank: bone lengths, m.
+    Returns:
+        The foot at these T moments.
+    """
     which = steps.current(times)
     share = np.clip((times - steps.on[which]) / (steps.off[which] - steps.on[which]), 0.0, 1.0)
     standing = stand(steps, which, share, neutral)
@@ -132,7 +164,7 @@ def travel(
 
 
 def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank) -> FootPath:
-    """The foot in the air at `times[air]`, after stances `which`."""
+    """Compute the foot in the air at `times[air]`, after stances `which`."""
     scale = neutral.leg / tables.LEG
     begin, end = steps.off[which], steps.on[which + 1]
     length = end - begin
@@ -153,6 +185,7 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
     now = free(times[air], share)
     step = 0.01
     at_leave, at_land = free(begin, np.zeros_like(share)), free(end, np.ones_like(share))
+    # velocities of the published swing at its ends, by one-sided differences
     free_leave = (free(begin + step * length, np.full_like(share, step)) - at_leave) / (step * length)[:, None]
     free_land = (at_land - free(end - step * length, np.full_like(share, 1 - step))) / (step * length)[:, None]
     wanted_leave = np.concatenate([leave.ankle, leave.pitch[:, None]], axis=-1)
@@ -169,7 +202,8 @@ def _swing(steps, which, times, air, hip, heading, neutral: Neutral, thigh_shank
 
 
 def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
-    """Speed (N, 4) of ankle and pitch at the end of stances `which` and at the beginning of the next ones."""
+    """Compute the velocities (N, 4) of ankle and pitch at the end of stances `which` and at the start of the next ones.
+    """
     edges = []
     for stance, inner, edge in ((which, 0.98, 1.0), (which + 1, 0.02, 0.0)):
         a, b = (stand(steps, stance, np.full(len(stance), u), neutral) for u in (inner, edge))
@@ -180,8 +214,9 @@ def _edge_speeds(steps: Footsteps, which: np.ndarray, neutral: Neutral) -> tuple
 
 
 def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Ankle ahead of and above the hip joint (N,), (N,) metres, and the sole's pitch (N,), from the published
-    angles."""
+    """Compute the ankle ahead of and above the hip joint, (N,) m each, and the sole's pitch (N,) rad, from published
+    angles.
+    """
     parts = []
     for at in (share, 1.0 - share):
         thigh, knee, ankle = np.moveaxis(tables.swing_angles(at, speed), -1, 0)
@@ -199,9 +234,11 @@ def _leg_swing(share, speed, direction, thigh_shank) -> tuple[np.ndarray, np.nda
 
 
 def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
-    """What has to be added (N, C) along a swing so that it begins and ends `offset`s away with `speed`s changed.
+    """Compute what to add (N, C) along a swing so that both ends move by the offsets and their speeds change as
+    requested.
 
-    Offsets are spread over the whole swing; speeds are mended within its first and last third."""
+    Offsets are spread over the whole swing; speeds are corrected within its first and last third.
+    """
     reach = 1.0 / 3.0
     blend = quintic_step(share)[:, None]
     out = offset0 * (1.0 - blend) + offset1 * blend
@@ -212,21 +249,27 @@ def _bridge(share, length, offset0, offset1, speed0, speed1) -> np.ndarray:
 
 
 def _small_step(share, leave, land, lift) -> np.ndarray:
-    """A foot that is only put elsewhere (N, 4): straight over, a little lifted."""
+    """Compute a foot (N, 4) that moves straight to its next place, slightly lifted."""
     out = leave + (land - leave) * quintic_step(share)[:, None]
     out[:, 2] += lift * np.sin(np.pi * share) ** 2
     return out
 
 
 def _clearance(ankle_up, pitch, share, size, neutral: Neutral) -> np.ndarray:
-    """How much (N,) metres the swinging foot has to be lifted so that toes and heel pass above the ground."""
+    """Compute how much (N,) m to lift the swinging foot so that toes and heel pass above the ground."""
     wanted = 0.014 * size * np.sin(np.pi * share) ** 2
     return lift_off_ground(ankle_up, pitch, neutral, wanted) * np.sqrt(np.clip(np.sin(np.pi * share), 0.0, 1.0))
 
 
 def lift_foot(rows: np.ndarray, neutral: Neutral) -> np.ndarray:
-    """An ankle's way and the foot's turn (T, 6), metres and radians, out of an adult's rows (T, 5): ahead, left,
-    raised, metres, pitch, yaw, degrees; not through the ground."""
+    """Convert table rows of a foot to the body's size, above the ground.
+
+    Args:
+        rows: (T, 5) of an adult: ahead, left, raised (m), pitch, yaw (degrees).
+        neutral: neutral stance of the body.
+    Returns:
+        (T, 6): ankle (m) and the foot's rotation (rad).
+    """
     scale = neutral.leg / tables.LEG
     ahead, left, raised, pitch, yaw = rows.T
     pitch, yaw = np.radians(pitch), np.radians(yaw)
@@ -238,9 +281,16 @@ def lift_foot(rows: np.ndarray, neutral: Neutral) -> np.ndarray:
 def lift_off_ground(
     ankle_up: np.ndarray, pitch: np.ndarray, neutral: Neutral, clearance: float | np.ndarray = 0.0
 ) -> np.ndarray:
-    """How much (T,) metres a foot has to be raised for its lowest point to be `clearance` above the ground, softly.
+    """Compute how much to raise a foot for its lowest point to be `clearance` above the ground, with a soft limit.
 
-    ankle_up (T,): height of the ankle, metres; pitch (T,): of the sole, toes down positive."""
+    Args:
+        ankle_up: (T,) m, height of the ankle.
+        pitch: (T,) rad of the sole, toes down positive.
+        neutral: neutral stance of the body.
+        clearance: m, one or (T,).
+    Returns:
+        (T,) m.
+    """
     ball_ahead, drop, ball_up = neutral.ball[0, 0], -neutral.ball[0, 2], neutral.ankle_height + neutral.ball[0, 2]
     toe = ankle_up - (ball_ahead + neutral.tip) * np.sin(pitch) - drop * np.cos(pitch) - ball_up
     heel = ankle_up + neutral.heel * np.sin(pitch) - neutral.ankle_height * np.cos(pitch)

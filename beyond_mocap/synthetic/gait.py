@@ -1,14 +1,14 @@
-"""A made gait: standing, walking, running and sprinting up to 9.5 m/s, any direction, any curve, on any humanoid
+"""Synthetic gait: standing, walking, running and sprinting up to 9.5 m/s, in any direction, on any curve and humanoid
 skeleton.
 
-Speed decides cadence, stance and swing, bounce, lean and arms by published figures (`gait_tables`); feet are planned
-and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics (`posture`).
-Bodies of another size move alike at the same Froude number v^2 / (g leg) (Alexander 1989): lengths grow with the leg,
-times with its root.
+Speed decides cadence, stance and swing, bounce, lean and arms by published figures (`gait_tables`). Feet are planned
+and planted first (`footsteps`), then the pelvis passes over them and the legs follow by inverse kinematics. Bodies of
+another size move alike at the same Froude number v^2 / (g leg) (Alexander 1989): lengths grow with the leg, times with
+its root.
 
-    gait(1.4, 6.0)                                 # six seconds of walking
-    gait(np.linspace(0, 8, 150), fps=30)           # from standing to a sprint in five seconds
-    gait(1.2, 6.0, direction=np.pi)                # backward, facing +X
+    build_gait(1.4, 6.0)                           # six seconds of walking
+    build_gait(np.linspace(0, 8, 150), fps=30)     # from standing to a sprint in five seconds
+    build_gait(1.2, 6.0, direction=np.pi)          # backward, facing +X
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from .course import Course, GaitStyle, plan, wander
 from .footsteps import Footsteps, travel
 from .gait_tables import at_speed, run_share
 
-# how far ahead of and behind the hips a flat foot stands at most, shares of the leg's length
+# farthest that a flat foot is ahead of and behind the hips, shares of the leg's length
 _AHEAD, _BEHIND = 0.41, 0.72
-# how far a leg is straightened at most, walking and running, share of its length: runners' knees stay bent by some 20
-# degrees (V, and recordings), and a knee that snaps straight is what eyes notice first
+# longest reach of a leg, walking and running, share of its length: runners' knees stay bent by about 20
+# degrees (V, and recordings), and a knee that snaps straight is the most visible error
 _STRAIGHTEST = (0.9955, 0.984)
-# where a swinging leg begins to ease towards that, share of its length below it
+# share of the leg's length below that limit from which a swinging leg eases toward it
 _EASE = 0.03
 
 
@@ -42,14 +42,26 @@ def gait(
     style: GaitStyle = GaitStyle(), phase: float = 0.0, turn_rate: float | np.ndarray = 0.0,
     direction: float | np.ndarray = 0.0, seed: int = 0, example: Motion | None = None,
 ) -> Motion:
-    """A body that travels at `speed` for `duration` seconds; it begins at the origin and faces +X.
+    """Build the motion of a body that travels; it begins at the origin and faces +X.
 
-    speed: m/s, 0 .. 9.5, one or one per frame (T,) (then without `duration`). turn_rate: radians per second, left
-    positive, and direction: travel relative to facing in radians (0 ahead, pi/2 left, pi back), each one or (T,).
-    skeleton: any humanoid one; default the project's adult. phase: strides at the first frame (0: left foot lands, 0.5:
-    right). seed: of the unevenness that `style.life` scales. example: a recording on `skeleton`, see
-    `neutral.neutral_stance`. The pelvis stays within a few centimetres of the asked path; planted feet do not slide.
-    Raises InputError for a speed below 0 or above 9.5, and for a wrong number of frames."""
+    The pelvis stays within a few centimetres of the requested path; planted feet do not slide.
+
+    Args:
+        speed: m/s, 0 to 9.5; one value, or one per frame (T,) (then without `duration`).
+        duration: s.
+        fps: frames per second.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        style: differences from the published figures.
+        phase: strides at the first frame (0: left foot lands, 0.5: right foot lands).
+        turn_rate: rad/s, left positive; one or (T,).
+        direction: rad, travel relative to the heading (0 ahead, pi/2 left, pi back); one or (T,).
+        seed: of the variation that `style.life` scales.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The motion.
+    Raises:
+        InputError: for a speed below 0 or above 9.5 m/s, or arrays of different lengths.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     course = plan(
         speed, duration, fps, neutral, phase=phase, turn_rate=turn_rate, direction=direction, style=style, seed=seed
@@ -58,17 +70,36 @@ def gait(
 
 
 def gait_posture(course: Course, neutral: Neutral, style: GaitStyle = GaitStyle(), seed: int = 0) -> Posture:
-    """The posture at the frames that `course` asks for."""
+    """Build the posture at the requested frames of a plan.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+        seed: of the variation.
+    Returns:
+        The posture, one row per requested frame.
+    """
     steps = tuple(footsteps(course, neutral, style, side) for side in (0, 1))
     return posture_over(course, steps, neutral, style, seed).frames(course.asked)
 
 
 def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> Footsteps:
-    """When and where one foot (0 left, 1 right) stands: below the hips in the middle of each stance, width and lean
-    apart."""
+    """Plan the stances of one foot: below the hips in the middle of each stance, apart from width and lean.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+        side: 0 left, 1 right.
+    Returns:
+        The stances.
+    """
     offset = 0.5 * side
+    # stride phases at which this foot lands
     cycles = np.arange(np.ceil(course.phase[0] - offset), np.floor(course.phase[-1] - offset)) + offset
     on = np.interp(cycles, course.phase, course.times)
+    # share of the stride in stance, by the speed at landing, then by the speed in mid-stance
     duty = at_speed("duty", np.interp(on, course.times, course.gear))
     duty = at_speed("duty", np.interp(cycles + 0.5 * duty, course.phase, course.gear))
     off = np.interp(cycles + duty, course.phase, course.times)
@@ -97,8 +128,7 @@ def footsteps(course: Course, neutral: Neutral, style: GaitStyle, side: int) -> 
 def _within_reach(
     course: Course, place: np.ndarray, on: np.ndarray, off: np.ndarray, leg: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Stances (K,) cut where the hips are too far from the foot: when speed changes within a stance, feet lift
-    earlier."""
+    """Cut stances (K,) where the hips are too far from the foot: when speed changes in a stance, feet lift earlier."""
     share = np.linspace(0.0, 0.5, 26)
     ends = []
     for edge, sign in ((on, -1.0), (off, 1.0)):
@@ -113,8 +143,7 @@ def _within_reach(
 
 
 def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
-    """How far the feet stay behind the hips (K, 2) metres while the body leans into an acceleration: the lean's
-    balance."""
+    """Compute how far the feet stay behind the hips (K, 2) m while the body leans into an acceleration."""
     height = 0.8 * (neutral.leg + neutral.ankle_height)
     shift = height * interpolate(at, course.times, course.acceleration) / tables.GRAVITY
     size = np.linalg.norm(shift, axis=-1, keepdims=True)
@@ -125,7 +154,17 @@ def _lean_shift(course: Course, neutral: Neutral, at: np.ndarray) -> np.ndarray:
 def posture_over(
     course: Course, steps: tuple[Footsteps, ...], neutral: Neutral, style: GaitStyle, seed: int
 ) -> Posture:
-    """The posture at all moments of `course` for feet that stand as `steps` says (left, right)."""
+    """Build the posture at all moments of a plan for given stances.
+
+    Args:
+        gait_plan: the plan.
+        steps: stances of the left and the right foot.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+        seed: of the variation.
+    Returns:
+        The posture, N rows.
+    """
     above = pose_trunk(course, neutral, style, seed)
     count = len(course.times)
     rate = 1.0 / (course.times[1] - course.times[0])
@@ -138,8 +177,16 @@ def posture_over(
 
 
 def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...], neutral: Neutral) -> Posture:
-    """The posture with feet that stand as `steps` says (left, right), hips lowered where a leg would not reach. times
-    (T,)."""
+    """Set the feet of a posture; the hips are lowered where a leg would not reach.
+
+    Args:
+        posture: the posture.
+        times: (T,) s.
+        steps: stances of the left and the right foot.
+        neutral: neutral stance of the body.
+    Returns:
+        The posture with feet.
+    """
     hips = posture.hips.copy()
     hips[:, 2] -= _drop(posture, times, steps, neutral)
     posture = posture.changed(hips=hips)
@@ -152,14 +199,23 @@ def with_feet(posture: Posture, times: np.ndarray, steps: tuple[Footsteps, ...],
 
 
 def _straightest(steps: Footsteps, times: np.ndarray) -> np.ndarray:
-    """How far a leg may be straightened at `times` (T,): (T,) share of its length."""
+    """Compute the longest reach of a leg at `times` (T,): (T,) share of its length."""
     walking, running = _STRAIGHTEST
     return walking + (running - walking) * tables.run_share(steps.speed[steps.current(times)])
 
 
 def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Footsteps, leg: float) -> np.ndarray:
-    """The ankle (T, 3) drawn to its hip (T, 3) where the leg, `leg` metres long, would be straightened too far in
-    swing."""
+    """Pull the ankle toward its hip where the leg would be too straight in swing.
+
+    Args:
+        ankle: (T, 3) m.
+        hip: (T, 3) m.
+        times: (T,) s.
+        steps: stances of the foot.
+        leg: length of the leg, m.
+    Returns:
+        (T, 3) m.
+    """
     away = ankle - hip
     far = np.linalg.norm(away, axis=1)
     share = ease_reach(far, (_straightest(steps, times) + 0.006 - _EASE) * leg, _EASE * leg)
@@ -167,13 +223,21 @@ def kept_bent(ankle: np.ndarray, hip: np.ndarray, times: np.ndarray, steps: Foot
 
 
 def ease_reach(far: np.ndarray, begin: float | np.ndarray, soft: float) -> np.ndarray:
-    """Share (T,) of distances `far` (T,) m that is gone where what lies beyond `begin` m is neared softly, never more
-    than `soft` m beyond it."""
+    """Compute by which factors to shorten distances so that they approach a limit softly.
+
+    Args:
+        far: (T,) m, distances.
+        begin: m from which on they are shortened.
+        soft: m, most that they exceed `begin`.
+    Returns:
+        (T,) factors, 1 below `begin`.
+    """
     eased = begin + soft * np.tanh((far - begin) / soft)
     return np.where(far < begin, 1.0, eased / np.maximum(far, 1e-9))
 
 
 def thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
+    """Measure the lengths of thigh and shank (m) of one side (0 left, 1 right)."""
     body = identify(neutral.skeleton)
     joints = (body.left, body.right)[side]
     hip, knee, ankle = (neutral.positions[j] for j in (joints.upper_leg, joints.lower_leg, joints.foot))
@@ -181,7 +245,7 @@ def thigh_shank(neutral: Neutral, side: int) -> tuple[float, float]:
 
 
 def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.ndarray:
-    """How much (T,) metres the hips have to sink so that standing feet are in reach, smooth in time."""
+    """Compute how far (T,) m to lower the hips so that feet in contact are in reach, smooth in time."""
     tops = hip_joints(posture, neutral)
     need = np.zeros(len(times))
     for side in (0, 1):
@@ -192,12 +256,22 @@ def _drop(posture: Posture, times: np.ndarray, steps, neutral: Neutral) -> np.nd
         highest = path.ankle[:, 2] + np.sqrt(np.maximum(longest**2 - flat, 0.0))
         need = np.maximum(need, np.where(steps[side].standing(times), tops[:, side, 2] - highest, 0.0))
     width = max(int(0.06 / (times[1] - times[0])), 1)
+    # the greatest need around each frame, then smoothed: never less than needed
     around = np.lib.stride_tricks.sliding_window_view(np.pad(need, width, mode="edge"), 2 * width + 1)
     return hann_smooth(np.max(around, axis=-1), width)
 
 
 def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) -> dict[str, np.ndarray]:
-    """Hips, pelvis, spine and head at all moments (arrays of `Posture`)."""
+    """Compute hips, pelvis, spine and head at all N moments.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+        seed: of the variation.
+    Returns:
+        Arrays of a `Posture` by name.
+    """
     gear, phase = course.gear, course.phase
     scale = neutral.leg / tables.LEG
     turn = 2.0 * np.pi * phase
@@ -251,16 +325,16 @@ def pose_trunk(course: Course, neutral: Neutral, style: GaitStyle, seed: int) ->
 
 
 def _surge(course: Course, middle: np.ndarray) -> np.ndarray:
-    """How far (N,) metres the hips run ahead of a steady pace: slowest over the middle of stance (braking, then
-    pushing)."""
+    """Compute how far (N,) m the hips are ahead of a steady pace: slowest in mid-stance (braking, then pushing)."""
     swing = np.minimum(0.07 * course.speed, 0.16)
     frequency = np.maximum(np.gradient(course.phase, course.times), 0.3)
     return -swing / (4.0 * np.pi * frequency) * np.sin(4.0 * np.pi * (course.phase - middle))
 
 
 def _leaning(course: Course) -> np.ndarray:
-    """Extra lean (N, 2) of the body into its acceleration: list (right down positive... about X) and tilt (about Y),
-    radians."""
+    """Compute the extra lean (N, 2) rad of the body into its acceleration: list (about X, right down positive) and tilt
+    (about Y).
+    """
     cos, sin = np.cos(course.heading), np.sin(course.heading)
     forward = course.acceleration[:, 0] * cos + course.acceleration[:, 1] * sin
     left = -course.acceleration[:, 0] * sin + course.acceleration[:, 1] * cos
@@ -268,8 +342,15 @@ def _leaning(course: Course) -> np.ndarray:
 
 
 def hip_height(course: Course, neutral: Neutral, style: GaitStyle) -> np.ndarray:
-    """Height (N,) metres of the hip joints: over the middle of stance as the knee's flexion there says, and the
-    bounce."""
+    """Compute the height of the hip joints: in mid-stance by the knee's flexion there, plus the bounce.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        style: style of the gait.
+    Returns:
+        (N,) m.
+    """
     gear, phase = course.gear, course.phase
     scale = neutral.leg / tables.LEG
     knee = np.radians(at_speed("knee_mid", gear)) + style.crouch
@@ -294,7 +375,15 @@ def hip_height(course: Course, neutral: Neutral, style: GaitStyle) -> np.ndarray
 
 
 def pose_arms(course: Course, style: GaitStyle, seed: int) -> np.ndarray:
-    """Arms (N, 2, 5) as in `Posture`: each forward together with the other side's leg."""
+    """Compute the arms: each swings forward together with the other side's leg.
+
+    Args:
+        gait_plan: the plan.
+        style: style of the gait.
+        seed: of the variation.
+    Returns:
+        (N, 2, 5) rad as in `Posture`.
+    """
     gear = course.gear
     run = run_share(gear)
     less = (1.0 - 0.5 * np.sin(0.5 * course.direction) ** 2) * (1.0 - 0.4 * np.sin(course.direction) ** 2)

@@ -30,7 +30,7 @@ from ..motion.retargeting import adult
 LEG = adult.LEG
 GRAVITY = 9.81  # m/s^2
 FASTEST = 9.5  # m/s, the tables' last speed
-# walking turns into running here (N: spontaneous change at 1.9 to 2.3 m/s)
+# m/s between which walking changes into running (N: spontaneous change at 1.9 to 2.3 m/s)
 _CHANGE = (1.95, 2.35)
 
 _SPEEDS: dict[str, list[tuple[float, float]]] = {
@@ -59,7 +59,7 @@ _SPEEDS: dict[str, list[tuple[float, float]]] = {
     "chest_turn": [(0, 0), (0.5, 2), (1.4, 4), (2.0, 5), (2.5, 6), (3.5, 6.5), (5.2, 8), (7, 9), (9.5, 10)],
     # list: the swing side's hip drops: M 4 to 5 each way, V 5 to 6
     "list": [(0, 0), (0.5, 1.5), (1.4, 3.6), (2.0, 4), (3.5, 4.5), (5.2, 5), (9.5, 5)],
-    # side sway of the pelvis to either side, metres: M
+    # sideways sway of the pelvis to either side, metres: M
     "sway": [(0, 0), (0.4, 0.030), (1.4, 0.019), (2.0, 0.014), (2.5, 0.008), (9.5, 0.004)],
     # vertical travel of the pelvis up and down from its middle, metres, walking only (running: L)
     "bob": [(0, 0), (0.5, 0.005), (1.0, 0.012), (1.4, 0.019), (1.9, 0.025), (2.3, 0.028), (9.5, 0.028)],
@@ -75,7 +75,7 @@ _SPEEDS: dict[str, list[tuple[float, float]]] = {
         (0, -0.02), (0.7, -0.08), (1.4, -0.135), (2.0, -0.16), (2.5, -0.165), (3.5, -0.18), (5.2, -0.17), (7, -0.155),
         (9.5, -0.145),
     ],
-    # arms: upper arm to and fro (half range) and its middle, forward positive: M (walking), H (running)
+    # arms: swing of the upper arm (half range) and its middle, forward positive: M (walking), H (running)
     "arm_swing": [(0, 0), (0.5, 7), (1.4, 17), (2.0, 23), (2.5, 21), (3.5, 26), (5.2, 34), (7, 44), (9.5, 54)],
     "arm_middle": [(0, 1), (1.4, -3), (2.0, -3), (2.5, -9), (3.5, -12), (5.2, -11), (7, -10), (9.5, -8)],
     # elbow flexion, middle and half range: M (20 to 40 in walking), H
@@ -93,13 +93,19 @@ def _curve(name: str) -> PchipInterpolator:
 
 
 def at_speed(name: str, speed: float | np.ndarray) -> np.ndarray:
-    """The figure `name` of the table at `speed` (...,) m/s, clamped to 0 .. 9.5: degrees, metres or Hz as the table
-    says."""
+    """Interpolate a figure of the table.
+
+    Args:
+        name: name of the figure.
+        speed: (...,) m/s, clamped to 0 .. 9.5.
+    Returns:
+        (...,) degrees, metres or Hz, as the table says.
+    """
     return _curve(name)(np.clip(speed, 0.0, FASTEST))
 
 
 def run_share(speed: np.ndarray) -> np.ndarray:
-    """How far running has replaced walking at `speed` (...,) m/s: 0 .. 1."""
+    """Compute how far running has replaced walking, 0 to 1, at `speed` (...,) m/s."""
     return quintic_step((np.asarray(speed) - _CHANGE[0]) / (_CHANGE[1] - _CHANGE[0]))
 
 
@@ -133,7 +139,14 @@ def _swing_curves() -> tuple[np.ndarray, CubicSpline]:
 
 
 def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Thigh, knee and ankle angle (..., 3) in radians at a share (...,) of the swing, for a speed (...,) in m/s."""
+    """Interpolate the angles of a swinging leg.
+
+    Args:
+        share: (...,) share of the swing.
+        speed: (...,) m/s.
+    Returns:
+        (..., 3) rad: thigh, knee and ankle.
+    """
     share, speed = np.broadcast_arrays(share, speed)
     speeds, spline = _swing_curves()
     values = spline(np.clip(share, 0.0, 1.0))
@@ -142,7 +155,7 @@ def swing_angles(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
     return np.radians(np.einsum("...s,...sa->...a", weights, values))
 
 
-# The standing foot: pitch of the sole (toes down positive) in degrees at shares of the stance. W and M (heel strike at
+# The foot in stance: pitch of the sole (toes down positive) in degrees at shares of the stance. W and M (heel strike at
 # 20, toe-off beyond 60), V (rearfoot runners), N and sprinters on video (forefoot: the heel never quite comes down).
 _STANCE_AT = (0, 0.06, 0.14, 0.25, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 _STANCE = {
@@ -160,8 +173,14 @@ def _stance_curves() -> tuple[np.ndarray, PchipInterpolator]:
 
 
 def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Pitch of the sole (...,) in radians, toes down positive, at a share (...,) of the stance, for a speed (...,) in
-    m/s."""
+    """Interpolate the pitch of the sole in stance.
+
+    Args:
+        share: (...,) share of the stance.
+        speed: (...,) m/s.
+    Returns:
+        (...,) rad, toes down positive.
+    """
     speeds, curve = _stance_curves()
     values = curve(np.clip(share, 0.0, 1.0))
     position = np.interp(speed, speeds, np.arange(len(speeds)))
@@ -171,8 +190,9 @@ def stance_pitch(share: np.ndarray, speed: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=None)
 def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height of a mass over one step for duty factors (share of the step): the sine-wave model L, by integrating
-    twice."""
+    """Compute the height of a mass over one step for duty factors (share of the step), by integrating source L's
+    sine-wave model twice.
+    """
     duties = np.linspace(0.40, 1.0, 25)
     phase = np.linspace(0.0, 1.0, 241)
     heights = np.empty((len(duties), len(phase)))
@@ -187,11 +207,19 @@ def _bounce_table() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def bounce(step_phase: np.ndarray, contact_share: np.ndarray, step_time: np.ndarray) -> np.ndarray:
-    """Height of the body over its mean, metres, in running (L): contact from step phase 0 to `contact_share`, then
-    flight.
+    """Compute the height of the body over its mean in running (source L).
 
-    step_phase (...,) 0 .. 1 from a foot's contact, contact_share (...,) of the step, step_time (...,) seconds."""
+    The foot is in contact from step phase 0 to `contact_share`, then the body flies.
+
+    Args:
+        step_phase: (...,) 0 to 1 from a foot's contact.
+        contact_share: (...,) share of the step in contact.
+        step_time: (...,) s.
+    Returns:
+        (...,) m.
+    """
     duties, phase, heights = _bounce_table()
+    # fractional row and column of the table, then bilinear interpolation
     row = np.interp(contact_share, duties, np.arange(len(duties)))
     column = (np.asarray(step_phase) % 1.0) * (len(phase) - 1)
     low_row, low_column = np.minimum(row.astype(int), len(duties) - 2), np.minimum(column.astype(int), len(phase) - 2)

@@ -1,10 +1,10 @@
-"""Synthetic touches of the ball on the run: kicks, a trap, a dribble; and key poses over time, as all moves use them.
+"""Synthetic touches of the ball while running: kicks, a trap, a dribble; and key poses over time, as all moves use
+them.
 
-Each is the gait's own posture with key poses laid over it, given as tables over seconds from the key moment (the
-touch). Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci
-Sports Exerc 34) and Lees, Asai, Andersen, Nunome and Sterzing 2010 (J Sports Sci 28): backswing to 100 degrees of
-knee flexion, impact with the knee near 45 and opening, support foot down a fifth of a second before, the opposite arm
-flung out.
+Each is the gait's posture with key poses blended over it, given as tables over seconds from the key moment (the touch).
+Instants, foot speeds and ranges of the instep kick follow Nunome, Asai, Ikegami and Sakurai 2002 (Med Sci Sports Exerc
+34) and Lees, Asai, Andersen, Nunome and Sterzing 2010 (J Sports Sci 28): backswing to 100 degrees of knee flexion,
+impact with the knee near 45 and opening, support foot down a fifth of a second before, the opposite arm swung out.
 """
 
 from __future__ import annotations
@@ -35,8 +35,14 @@ LEFT, RIGHT = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class Gesture:
-    """A made move. motion; key: seconds of the key moment (None for continuous moves); start, end: seconds of the
-    move."""
+    """A synthetic move.
+
+    Attributes:
+        motion: the motion.
+        key: s of the key moment; None for continuous moves.
+        start: s at which the move starts.
+        end: s at which it ends.
+    """
 
     motion: Motion
     key: float | None
@@ -46,13 +52,21 @@ class Gesture:
 
 @dataclass(frozen=True, kw_only=True)
 class Strike:
-    """How the right foot meets the ball and what the body does meanwhile; seconds from the touch, metres, degrees.
+    """How the right foot meets the ball and how the body moves; seconds from the touch, metres of an adult, degrees.
 
-    foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); an adult's metres. pelvis,
-    spine: rows (time, list, tilt, turn). left_arm, right_arm: rows (time, flexion, abduction, inward, elbow). speeds:
-    rows (time, m/s). pace: factor on the cadence around the touch. at: share of the right foot's swing at which it
-    touches. sink: rows (time, metres the hips are lowered). head: nod in degrees. fling: share of the arms' and trunk's
-    rows that is laid over the run."""
+    Attributes:
+        foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll).
+        pelvis: rows (time, list, tilt, turn).
+        spine: rows (time, list, tilt, turn).
+        left_arm: rows (time, flexion, abduction, inward, elbow).
+        right_arm: rows (time, flexion, abduction, inward, elbow).
+        speeds: rows (time, m/s).
+        pace: factor on the cadence around the touch.
+        at: share of the right foot's swing at which it touches.
+        sink: rows (time, metres that the hips are lowered).
+        head: nod in degrees.
+        blend_share: share of the arms' and trunk's rows that is blended over the run.
+    """
 
     foot: tuple
     pelvis: tuple
@@ -116,14 +130,14 @@ STRIKES = {
 }
 
 
-# a kick at full run: shares of the run's speed, the body hardly slows for it
+# a kick at full run: shares of the run's speed; the body hardly slows down
 _RUNNING_SPEEDS = ((-0.8, 1.0), (-0.35, 1.0), (0.0, 0.96), (0.25, 0.95), (0.8, 1.0))
-# m/s between which a kick becomes one at full run, and there the factor on cadence and the share of the standing foot's
+# m/s between which a kick becomes one at full run; there: factor on cadence, and share of the support foot's
 # stance that has passed at the touch
 _FULL_RUN, _RUNNING_PACE, _RUNNING_STANCE = (3.0, 6.0), 0.93, 0.45
 
 
-# seconds that the kicking foot needs for its way to the ground
+# s that the kicking foot needs to reach the ground
 _LANDING = 0.1
 
 
@@ -131,10 +145,21 @@ def strike(
     kind: str, skeleton: Skeleton | None = None, fps: float = 60.0, speed: float = 1.0, seed: int = 0, *,
     at_speed: float | None = None, example: Motion | None = None,
 ) -> Gesture:
-    """The right foot meets the ball after an approach and runs on: `kind` is one of STRIKES; facing and travelling +X.
+    """Build a strike of the right foot after an approach; the body faces and travels along +X and runs on.
 
-    speed: factor on the approach's speed. at_speed: m/s of a run in which the kick happens, instead of an approach that
-    slows down. example: as for `gait`. At the key moment the ball is at the foot, see `foot` of the Strike."""
+    At the key moment the ball is at the foot, see `foot` of the Strike.
+
+    Args:
+        kind: one of STRIKES.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        speed: factor on the approach's speed.
+        seed: of the gait's variation.
+        at_speed: m/s of a run in which the kick happens, instead of an approach that slows down.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The move.
+    """
     recipe = STRIKES[kind] if at_speed is None else _on_the_run(STRIKES[kind], at_speed)
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     key = -recipe.speeds[0][0]
@@ -152,8 +177,11 @@ def strike(
 
 
 def _on_the_run(recipe: Strike, speed: float) -> Strike:
-    """The same strike in a run at `speed` m/s: the steps keep their rhythm, arms and trunk swing out less, and the
-    touch falls into the middle of the standing foot's short stance."""
+    """Adapt a strike to a run at `speed` m/s.
+
+    Steps keep their rhythm, arms and trunk swing less, and the touch falls in the middle of the support foot's short
+    stance.
+    """
     share = float(quintic_step((speed - _FULL_RUN[0]) / (_FULL_RUN[1] - _FULL_RUN[0])))
     duty = float(tables.at_speed("duty", speed))
     at = (0.5 + (_RUNNING_STANCE - 1.0) * duty) / (1.0 - duty)
@@ -165,8 +193,7 @@ def _on_the_run(recipe: Strike, speed: float) -> Strike:
 
 
 def _in_step(course: Course, key: float, recipe: Strike) -> Course:
-    """The course with a cadence that dips around the touch, and a phase at which the right foot is in its swing
-    there."""
+    """Adapt a plan: the cadence dips around the touch, and the right foot is in its swing then."""
     rate = np.gradient(course.phase, course.times)
     dip = 1.0 - (1.0 - recipe.pace) * np.exp(-(((course.times - key - 0.1) / 0.33) ** 2))
     phase = np.concatenate([[0.0], np.cumsum(0.5 * (rate * dip)[1:] + 0.5 * (rate * dip)[:-1])])
@@ -177,12 +204,13 @@ def _in_step(course: Course, key: float, recipe: Strike) -> Course:
 
 
 def _swing_around(steps: Footsteps, moment: float) -> tuple[float, float]:
-    """Seconds at which the swing around `moment` begins and ends."""
+    """Find the seconds at which the swing around `moment` begins and ends."""
     which = int(steps.current(np.array([moment]))[0])
     return float(steps.off[which]), float(steps.on[which + 1])
 
 
 def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Strike, neutral: Neutral) -> Posture:
+    """Blend a strike's trunk, arms and foot over the posture of a run."""
     scale = neutral.leg / tables.LEG
     times = course.times - key
     hips = posture.hips.copy()
@@ -201,7 +229,7 @@ def _laid_over(posture: Posture, course: Course, steps, key: float, recipe: Stri
 
 
 def _kicking_foot(posture: Posture, course: Course, steps: Footsteps, key: float, rows, neutral: Neutral) -> Posture:
-    """The right foot's swing around `key` seconds led through the rows of a Strike; its ends stay as they were."""
+    """Guide the right foot's swing around `key` seconds through the rows of a Strike; its ends stay as they were."""
     swing = _swing_around(steps, key)
     scale = neutral.leg / tables.LEG
     inside = (course.times > swing[0]) & (course.times < swing[1])
@@ -232,9 +260,19 @@ def _kicking_foot(posture: Posture, course: Course, steps: Footsteps, key: float
 def dribble(
     speed: float, duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, **way
 ) -> Motion:
-    """Running with the ball at the feet: short strides, bent knees, the eyes down, each right swing ends in a touch.
+    """Build a run with the ball at the feet: short strides, bent knees, the head down; each right swing ends in a
+    touch.
 
-    `way`: turn_rate, phase as for `gait`."""
+    Args:
+        speed: m/s.
+        duration: s.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the gait's variation.
+        gait_options: turn_rate, phase as for `build_gait`.
+    Returns:
+        The motion.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton())
     style = GaitStyle(cadence=1.12, crouch=np.radians(7), lean=np.radians(4), head=np.radians(30), abduct=np.radians(9))
     course = plan(speed, duration, fps, neutral, style=style, seed=seed, **way)
@@ -256,22 +294,48 @@ def dribble(
 
 
 def keyed(rows, times: np.ndarray) -> np.ndarray:
-    """Rows (time, values...) as smooth curves without overshoot (T, values), held before the first and after the
-    last."""
+    """Interpolate rows smoothly without overshoot; constant before the first and after the last row.
+
+    Args:
+        rows: (time, values...) each.
+        times: (T,) s.
+    Returns:
+        (T, values).
+    """
     first, last, curve = _curve(tuple(map(tuple, rows)))
     return curve(np.clip(times, first, last))
 
 
 def keyed_rounded(rows, times: np.ndarray, frames: float) -> np.ndarray:
-    """`keyed` without corners in the speed: (T, values) behind a Gaussian of `frames` standard deviation."""
+    """Interpolate rows as `interpolate_rows`, without corners in the speed.
+
+    Args:
+        rows: (time, values...) each.
+        times: (T,) s.
+        frames: standard deviation of the Gaussian in frames.
+    Returns:
+        (T, values).
+    """
     from scipy.ndimage import gaussian_filter1d
 
     return gaussian_filter1d(keyed(rows, times), frames, axis=0, mode="nearest")
 
 
 def begin_plan(style, neutral: Neutral, times: np.ndarray, frames: float) -> tuple:
-    """What planned throws and kicks have in common, at `times` (T,): how tables are read, corners rounded over `frames`
-    (rows -> (T, values)); pelvis and spine (T, 3) and arms (T, 2, 5) as in a `Posture`; metres of the hips' height."""
+    """Compute what synthetic throws and kicks have in common.
+
+    Args:
+        style: a throw's or kick's style.
+        neutral: neutral stance of the body.
+        times: (T,) s.
+        frames: standard deviation over which corners of the tables are rounded, in frames.
+    Returns:
+        curve: function rows -> (T, values), rounded.
+        pelvis: (T, 3) rad as in a `Posture`.
+        spine: (T, 3) rad.
+        arms: (T, 2, 5) rad.
+        height: height of the hips, m.
+    """
 
     def curve(rows) -> np.ndarray:
         return keyed_rounded(rows, times, frames)
@@ -286,8 +350,21 @@ def begin_plan(style, neutral: Neutral, times: np.ndarray, frames: float) -> tup
 def choose_style(
     action: str, side: str, limb: str, *, style, styles: Mapping, speed: float, speeds: tuple[float, float]
 ):
-    """`style`, or that of `styles` with its name, for a throw or kick with the left or right limb at `speed` m/s.
-    InputError for an unknown one, another side, a speed beyond `speeds` (lowest, highest)."""
+    """Choose the style of a throw or kick.
+
+    Args:
+        action: "throw" or "kick", for messages.
+        side: "left" or "right".
+        limb: "arm" or "leg", for messages.
+        style: a style, or the name of one.
+        styles: styles by name.
+        speed: of the ball, m/s.
+        speeds: lowest and highest possible speed, m/s.
+    Returns:
+        The style.
+    Raises:
+        InputError: for an unknown style or side, or a speed out of range.
+    """
     how = style if isinstance(style, type(next(iter(styles.values())))) else styles.get(style)
     if side not in ("left", "right") or how is None:
         raise InputError(action, f"{style} with the {side} {limb}", f"left or right, {' or '.join(styles)}")
@@ -298,16 +375,17 @@ def choose_style(
 
 @lru_cache(maxsize=256)
 def _curve(rows: tuple) -> tuple[float, float, PchipInterpolator]:
-    """First and last time and the curve of a table; kept, as a made movement is planned again and again."""
+    """Build the first time, last time and curve of a table; cached, because a synthetic move is planned many times."""
     table = np.array(rows, dtype=float)
     return table[0, 0], table[-1, 0], PchipInterpolator(table[:, 0], table[:, 1:], axis=0)
 
 
 def envelope(times: np.ndarray, begin: float, full: float, fade: float, end: float) -> np.ndarray:
-    """0 before `begin`, 1 from `full` to `fade`, 0 after `end` (T,)."""
+    """Compute weights (T,): 0 before `begin`, 1 from `full` to `fade`, 0 after `end`."""
     return quintic_step((times - begin) / (full - begin)) * (1.0 - quintic_step((times - fade) / (end - fade)))
 
 
 def mixed(a: np.ndarray, b: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Blend arrays (T, ...) by a weight (T,): 0 gives `a`, 1 gives `b`."""
     weight = weight.reshape(weight.shape + (1,) * (a.ndim - 1))
     return a * (1.0 - weight) + b * weight

@@ -1,10 +1,11 @@
-"""Made kicks: three steps up to a ball that lies, the other foot planted beside it, and a leg that whips through it.
+"""Synthetic kicks: three steps to a ball on the ground, the other foot planted beside it, and a leg that whips through
+it.
 
 Instants, angles and rates of the instep kick follow Lees and Nolan 1998 (J. Sports Sci. 16, 211-234), Nunome, Asai,
 Ikegami and Sakurai 2002 (Med. Sci. Sports Exerc. 34, 2028-2036) and Kellis and Katis 2007 (J. Sports Sci. Med. 6,
-154-165): an approach of 3 m/s at some 35 degrees, the foot planted beside the ball 0.11 s before the contact, the
-pelvis turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees a second, the
-trunk inclined to the standing leg. Here is the body alone; what its foot gives the ball stands in `throws.letting_go`.
+154-165): an approach of 3 m/s at about 35 degrees, the foot planted beside the ball 0.11 s before the contact, the
+pelvis turned back by 30 degrees and then through, a knee bent by 105 degrees that extends at 1500 degrees per second,
+the trunk inclined to the support leg. This module has the body alone, not the ball that leaves its foot.
 """
 
 from __future__ import annotations
@@ -27,24 +28,30 @@ from .gestures import RIGHT, begin_plan
 
 BEFORE, AFTER = 1.5, 1.3
 """Seconds of a hard kick before and after the contact; slower ones take longer."""
-_PLAN = 480.0  # frames a second at which a kick is planned
-_NEAR = 0.05  # s around the contact that tell all about it
+_PLAN = 480.0  # Hz at which a kick is planned
+_NEAR = 0.05  # s around the contact that are enough to compute it
 _ROUND = 0.008  # s over which corners of the tables are rounded
-_LIFT = 0.07  # s, standard deviation of the time in which the foot is led higher or lower around the contact
-_TOES_UP = 0.35  # radians that the toes are bent up at the contact
-_FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s, between which the leg leaves the ground, comes back to it
+_LIFT = 0.07  # s, standard deviation of the time in which the foot is guided higher or lower around the contact
+_TOES_UP = 0.35  # rad by which the toes are bent up at the contact
+_FREE, _DOWN = (-0.29, -0.19), (0.26, 0.50)  # s from contact: the leg leaves the ground, and returns to it
 
 
 @dataclass(frozen=True, kw_only=True)
 class KickStyle:
-    """How a right foot kicks towards +X; seconds from the contact, degrees, metres of an adult.
+    """How a right foot kicks along +X; seconds from the contact, degrees, metres of an adult.
 
-    approach: degrees that the way up to the ball is turned to the kicking leg. strides: lengths of the three steps.
-    leg: rows (time, thigh forward, knee bent). plane: rows (time, turn of the plane in which the leg swings,
-    abduction). foot: rows (time, bent down at the ankle, toes turned out). pelvis: rows (time, list, tilt, turn),
-    spine: rows (time, list, tilt, turn), both as in a `Posture`. left_arm, right_arm: rows (time, brought forward,
-    abduction, inward turn, elbow). hips: rows (time, ahead of where they are at the contact, left of it, lowered), from
-    the planting on."""
+    Attributes:
+        approach: degrees that the run-up is turned toward the kicking leg.
+        strides: lengths of the three steps.
+        leg: rows (time, thigh forward, knee bent).
+        plane: rows (time, turn of the plane in which the leg swings, abduction).
+        foot: rows (time, bent down at the ankle, toes turned out).
+        pelvis: rows (time, list, tilt, turn) as in a `Posture`.
+        spine: rows (time, list, tilt, turn) as in a `Posture`.
+        left_arm: rows (time, brought forward, abduction, inward turn, elbow).
+        right_arm: rows (time, brought forward, abduction, inward turn, elbow).
+        hips: rows (time, ahead of their place at the contact, left of it, lowered), from the planting on.
+    """
 
     approach: float
     strides: tuple[float, ...]
@@ -129,8 +136,8 @@ _INSIDE = KickStyle(
 )  # fmt: skip
 KICKS = {"instep": _INSTEP, "inside": _INSIDE}
 _HIPS_AT_CONTACT = np.array([-0.22, 0.18])  # m from the kicking ankle at the contact
-_PLANTED = np.array([-0.05, 0.30])  # m, the standing foot's ankle
-_APART = 0.19  # m between the lines on which left and right foot go
+_PLANTED = np.array([-0.05, 0.30])  # m, the support foot's ankle
+_APART = 0.19  # m between the lines of the left and the right foot
 _STEPS = ((-1.30, -0.90), (-1.02, -0.47), (-0.55, -0.11))  # s, off the ground and down again: left, right, left
 
 
@@ -138,11 +145,20 @@ def kicked(
     style: KickStyle, neutral: Neutral, foot: str = "right", lift: float = 0.0, loft: float = 0.0, rate: float = 1.0,
     turn: float = 0.0, fps: float = 120.0,
 ) -> Motion:
-    """A kick along +X, or turned by `turn` radians, at `rate` times the pace; the contact comes at BEFORE / rate
-    seconds.
+    """Build a kick along +X, or turned about the vertical.
 
-    foot: "left" or "right". lift: metres of an adult by which the foot is led higher at the contact than the style has
-    it. loft: degrees by which its toes point less down there. fps: frames per second."""
+    Args:
+        style: style of the kick.
+        neutral: neutral stance of the body.
+        foot: "left" or "right".
+        lift: metres of an adult by which the foot is guided higher at the contact than in the style.
+        loft: degrees by which its toes point less down there.
+        rate: playback rate; the contact is at BEFORE / rate seconds.
+        turn: rad.
+        fps: frames per second.
+    Returns:
+        The motion.
+    """
     times = np.arange(int(round((AFTER + BEFORE) * _PLAN)) + 1) / _PLAN - BEFORE
     posture, curve = _upright(style, neutral, times)
     plan = to_motion(_swung(posture, style, times, neutral=neutral, curve=curve, lift=lift, loft=loft), neutral)
@@ -155,8 +171,17 @@ def kicked(
 def contact(
     style: KickStyle, neutral: Neutral, foot: str, ways: Sequence[tuple[float, float]] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, 2, 3) m and velocities (N, 2, 3) m/s of ankle and toe joint at the contact of `kicked` with the same,
-    in N ways of (lift, loft)."""
+    """Compute ankle and toe joint at the contact of `build_kick`, in N variants.
+
+    Args:
+        style: style of the kick.
+        neutral: neutral stance of the body.
+        foot: "left" or "right".
+        variants: (N, 2) lift and loft of each variant.
+    Returns:
+        places: (N, 2, 3) m, ankle and toe joint.
+        velocities: (N, 2, 3) m/s.
+    """
     count = int(round(2.0 * _NEAR * _PLAN))
     times = np.arange(count + 1) / _PLAN - _NEAR
     before, curve = _upright(style, neutral, times)
@@ -173,7 +198,7 @@ def contact(
 
 
 def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Posture, Callable]:
-    """The kick's posture at the planning rate, but for the way of the leg that swings; and how its tables are read."""
+    """Build the kick's posture at the planning rate without the leg's swing, and the function that reads its tables."""
     nothing = np.zeros_like(times)
     curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
     falls = _footfalls(style)
@@ -192,12 +217,13 @@ def _upright(style: KickStyle, neutral: Neutral, times: np.ndarray) -> tuple[Pos
 
 
 _NOD = ((-1.5, 8), (-0.6, 16), (0.0, 26), (0.15, 20), (0.4, -4), (1.3, 0))
-"""Degrees that the head looks down, at the ball until it has gone."""
+"""Degrees that the head looks down: at the ball until it has left."""
 
 
 def _footfalls(style: KickStyle) -> dict[str, np.ndarray]:
-    """Where (2,) m the feet stand one after the other: `left0` and `right0` at the start, `left1`, `right1`, `planted`,
-    and at the end `right2`, `left2`."""
+    """Compute the places (2,) m of the feet in order: `left0` and `right0` at the start, `left1`, `right1`, `planted`,
+    at the end `right2`, `left2`.
+    """
     turn = np.radians(style.approach)
     ahead, left = np.array([np.cos(turn), -np.sin(turn)]), np.array([np.sin(turn), np.cos(turn)])
     first, second, third = style.strides
@@ -212,7 +238,7 @@ def _footfalls(style: KickStyle) -> dict[str, np.ndarray]:
 
 
 def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
-    """Rows (time, ahead, left, lowered) of the middle between the hip joints, m."""
+    """Build rows (time, ahead, left, lowered) of the middle between the hip joints, m."""
     turn = np.radians(style.approach)
     ahead, left = np.array([np.cos(turn), -np.sin(turn)]), np.array([np.sin(turn), np.cos(turn)])
 
@@ -229,8 +255,10 @@ def _hips(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple:
 
 
 def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple]:
-    """Rows (time, ahead, left, raised, pitch, yaw) of left and right foot; the right one's own way from _FREE on is the
-    leg's."""
+    """Build rows (time, ahead, left, raised, pitch, yaw) of both feet.
+
+    From _SWING_START on, the right foot follows the leg.
+    """
     yaw = -style.approach
     one, two, three = _STEPS
     left = (
@@ -246,7 +274,7 @@ def _steps(style: KickStyle, falls: dict[str, np.ndarray]) -> tuple[tuple, tuple
 
 
 def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: float, yaw: float, later: float) -> tuple:
-    """Rows of one step: the heel rises, the foot swings over and lands heel first."""
+    """Build rows of one step: the heel rises, the foot swings over and lands heel first."""
     begin, end = when
     d, way = end - begin, down - off
 
@@ -261,8 +289,10 @@ def _step(when: tuple[float, float], off: np.ndarray, down: np.ndarray, high: fl
 
 
 def _foot(rows: np.ndarray, neutral: Neutral, side: int) -> np.ndarray:
-    """An ankle's way, the foot's turn and its toes (T, 7) out of rows (T, 5). A heel that rises turns about the ball of
-    the foot, which stays."""
+    """Compute ankle, rotation and toes (T, 7) of a foot from rows (T, 5).
+
+    A heel that rises turns about the ball of the foot, which stays in place.
+    """
     foot = lift_foot(rows, neutral)
     pitch, yaw = foot[:, 4], foot[:, 5]
     length, height = neutral.ball[side, 0], -neutral.ball[side, 2]
@@ -276,7 +306,7 @@ def _foot(rows: np.ndarray, neutral: Neutral, side: int) -> np.ndarray:
 def _swung(
     posture: Posture, style: KickStyle, times: np.ndarray, neutral: Neutral, curve, lift: float, loft: float
 ) -> Posture:
-    """The posture with its right leg swung as the style has it, from where it leaves the ground until it comes back."""
+    """Swing the right leg of a posture as the style says, from leaving the ground until it returns."""
     lift, loft = lift * neutral.leg / tables.LEG, np.radians(loft)
     thigh, knee = np.radians(curve(style.leg)).T
     turn, abduction = np.radians(curve(style.plane)).T

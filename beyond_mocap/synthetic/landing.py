@@ -1,9 +1,10 @@
-"""What follows a recording that ends in flight: free fall, the landing, lying still, and getting up.
+"""Synthetic continuation of a recording that ends in flight: free fall, landing, lying still, and getting up.
 
-Goalkeepers' dives are recorded over floors that nobody likes to land on, and stop before the landing. Held there, or
-cut to the next clip, the body hangs in the air. Here it falls on: its middle as a stone does, its limbs and its own
-spin from what they were towards the pose it lands in; the ground stops the fall, friction the sliding; it settles,
-turns as the nearest way of getting up begins, and gets up.
+Goalkeepers' dives are recorded on hard floors and stop before the landing. Held there, or cut to the next clip, the
+body
+hangs in the air. Here it keeps falling: its centre by gravity, its limbs and its spin from their last state toward the
+pose of landing. The ground stops the fall and friction the sliding; the body settles, turns to the start of the nearest
+way of getting up, and gets up.
 """
 
 from __future__ import annotations
@@ -25,32 +26,38 @@ from .gait_tables import GRAVITY
 from .resting import arms_above_ground, lowest_root, on_the_side, widened
 
 IN_THE_AIR = 0.25
-"""Metres between the lowest part of the body and the ground, above which a recording's end is a flight."""
+"""Metres between the lowest part of the body and the ground above which a recording's end is a flight."""
 
 LEANING = np.radians(25.0)
-"""A trunk that leans less comes down on its feet, which is not made here."""
+"""Rad: a trunk that leans less lands on its feet, which is not synthesized here."""
 
-_MEASURED = 0.05  # seconds over which speeds at the recording's end are taken
-_FASTEST_TURN = 6.0  # radians per second; faster ones are the end of a filter
-_MIDDLE = 0.25  # of the way from hips to neck: the body's middle, which falls freely
+_MEASURED = 0.05  # s over which speeds at the recording's end are measured
+_FASTEST_TURN = 6.0  # rad/s; faster rotations at the end are artefacts of filters
+_MIDDLE = 0.25  # of the distance from hips to neck: the body's centre, which falls freely
 _LONGEST_FALL = 1.5  # s
-_SETTLING, _LYING_STILL = 0.4, 0.15  # seconds from touching the ground to turning, and from there to getting up
-_STARTING = 0.4  # seconds in which the way up gathers speed
+_SETTLING, _LYING_STILL = 0.4, 0.15  # s from touching the ground to turning, and from there to getting up
+_STARTING = 0.4  # s in which getting up reaches its full speed
 _FRICTION = 0.13  # seconds in which a sliding body loses two thirds of its speed
-_CUSHION = 0.05  # metres over which the ground takes the fall up
+_CUSHION = 0.05  # m over which the ground stops the fall
 _RATES = (11.0, 11.0, 7.0)  # per second: in the air, landing, turning over and getting up
-_HASTE = 1.25  # a player gets up faster than who shows it in a studio
-_LEAD = 0.4  # seconds before the hips rise at which a way of getting up is begun
-_RISEN = 0.04  # m of the hips above where they lay, from which a way up begins
-_SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # metres per second squared of a marker taken for another, near the end
+_HASTE = 1.25  # playback rate: players get up faster than performers in a studio
+_LEAD = 0.4  # s before the hips rise at which a recording of getting up starts
+_RISEN = 0.04  # m above their lowest height that the hips rise before getting up begins
+_SWAPPED, _SWAPPED_SECONDS = 1500.0, 0.12  # m/s^2 of swapped markers, and s before the end in which they are searched
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Landed:
-    """motion: the recording, frame by frame as it was, and what follows. recorded, touched, rising: number of recorded
-    frames that are kept (all, but for a few behind a jump of its markers just before its end), the frame at which the
-    body meets the ground, and the one from which on the way up is played. way: index of the way up, and way_frames
-    (R,): its fractional frames from `rising` on."""
+    """A recording with its continuation.
+
+    Attributes:
+        motion: the recording, frame by frame as it was, and what follows.
+        recorded_count: recorded frames that are kept: all except a few after a jump of markers near the end.
+        touch_frame: frame at which the body meets the ground.
+        rise_frame: first frame of getting up.
+        get_up_index: index of the recording of getting up.
+        get_up_frames: (R,) fractional frames of that recording, from `rise_frame` on.
+    """
 
     motion: Motion
     recorded: int
@@ -61,7 +68,7 @@ class Landed:
 
 
 def ends_in_flight(motion: Motion) -> bool:
-    """Whether the last frame shows a body off the ground (height 0) that will not come down on its feet."""
+    """Whether the last frame shows a body above the ground (height 0) that will not land on its feet."""
     last = motion.rotations[-1:]
     above = float(motion.root_positions[-1, 2] - lowest_root(motion.skeleton, last)[0])
     if above < IN_THE_AIR or len(motion) < 3:
@@ -70,10 +77,15 @@ def ends_in_flight(motion: Motion) -> bool:
 
 
 def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
-    """The recording with flight, landing and getting up behind it, by the way up that needs least turning over.
+    """Continue a recording with flight, landing and getting up, by the recording of getting up that needs least rolling
+    over.
 
-    motion: ends in flight, the ground at height 0. ways_up: at least one motion of the same skeleton from lying to
-    standing, on the same ground."""
+    Args:
+        motion: ends in flight; the ground has height 0.
+        get_up_motions: recordings of the same skeleton from lying to standing, one or more, on the same ground.
+    Returns:
+        The recording with its continuation.
+    """
     skeleton, body, fps = motion.skeleton, identify(motion.skeleton), motion.fps
     motion = motion.frames(0, _trusted(motion))
     track = _Track(motion)
@@ -82,6 +94,7 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
     poses = track.towards(landing, fall, _RATES[0])
     centre = _Fall.of(motion, body)
     height = centre.height(fall) - _to_middle(skeleton, body, poses)[:, 2]
+    # the first frame in which the lowest part of the body is below the ground
     under = height < lowest_root(skeleton, poses, arms=False)
     touched = int(np.argmax(under)) if under.any() else len(fall) - 1
     seconds_down = float(fall[touched])
@@ -112,14 +125,19 @@ def landed(motion: Motion, ways_up: Sequence[Motion]) -> Landed:
 
 @dataclass(frozen=True, eq=False)
 class _Fall:
-    """The body's middle: place (3,) m and speed (3,) m/s at the recording's end."""
+    """The body's centre at the recording's end.
+
+    Attributes:
+        place: (3,) m.
+        speed: (3,) m/s.
+    """
 
     place: np.ndarray
     speed: np.ndarray
 
     @classmethod
     def of(cls, motion: Motion, body: Humanoid) -> "_Fall":
-        """From the last frames; what gravity did meanwhile is reckoned in."""
+        """Measure it over the last frames; gravity in these frames is taken into account."""
         count = _measured(motion)
         last = motion.frames(len(motion) - 1 - count, len(motion))
         middle = last.root_positions + _to_middle(motion.skeleton, body, last.rotations)
@@ -128,18 +146,21 @@ class _Fall:
         return cls(middle[-1], speed)
 
     def height(self, seconds: np.ndarray) -> np.ndarray:
-        """(T,) m."""
+        """Compute the height (T,) m after `seconds` (T,)."""
         return self.place[2] + self.speed[2] * seconds - 0.5 * GRAVITY * seconds**2
 
     def level(self, seconds: np.ndarray, down: float) -> np.ndarray:
-        """(T, 2) m: at its speed until it is down, then sliding to rest."""
+        """Compute the position (T, 2) m on the ground plane: at constant speed until `down` s, then sliding to a stop.
+        """
         slid = np.where(seconds > down, _FRICTION * (1.0 - np.exp(-np.maximum(seconds - down, 0.0) / _FRICTION)), 0.0)
         return self.place[:2] + (np.minimum(seconds, down) + slid)[:, None] * self.speed[:2]
 
 
 class _Track:
-    """Local rotations (J, 4) in motion: where they are, how fast they turn (J, 3) rad/s in their own frames, and how
-    that changes; `towards` lets what they are off a goal fade."""
+    """Local rotations (J, 4) in motion, with their angular velocity (J, 3) rad/s in their own frames and its change.
+
+    `blend_toward` lets their offset from a goal fade.
+    """
 
     def __init__(self, motion: Motion | None = None, pose=None, speed=None, acceleration=None):
         if motion is not None:
@@ -153,25 +174,29 @@ class _Track:
         self.pose, self.speed, self.acceleration = pose, speed, acceleration
 
     def _off(self, goal: np.ndarray) -> Offset:
-        """What they are off a goal (J, 4), as rotation vectors that turn the goal."""
+        """Compute the offset from a goal (J, 4), as rotation vectors that turn the goal."""
         off = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(goal), self.pose))
         return Offset(off, self.speed, self.acceleration)
 
     def towards(self, goal: np.ndarray, seconds: np.ndarray, rate: float) -> np.ndarray:
-        """Local rotations (T, J, 4) after `seconds` (T,); goal: (J, 4), or (T, J, 4) where it moves, from rest."""
+        """Compute the local rotations (T, J, 4) after `seconds` (T,); goal: (J, 4), or (T, J, 4) where it moves, from
+        rest.
+        """
         first = goal if goal.ndim == 2 else goal[0]
         return quaternion.multiply(goal, quaternion.from_rotation_vector(self._off(first).faded(seconds, rate).place))
 
     def at(self, goal: np.ndarray, seconds: float, rate: float) -> "_Track":
-        """Where they are after `seconds`."""
+        """Compute the state after `seconds`."""
         off = self._off(goal).faded(np.array([seconds]), rate)
         pose = quaternion.multiply(goal, quaternion.from_rotation_vector(off.place[0]))
         return _Track(None, pose, off.speed[0], off.acceleration[0])
 
 
 def _shown(count: int, fps: float) -> np.ndarray:
-    """Fractional frames (R,) of a way up of `count` frames as it is shown: its first for a while, then faster and
-    faster until it plays as it is."""
+    """Compute the fractional frames (R,) in which a recording of getting up plays.
+
+    Its first frame stays for a while, then it accelerates to its own speed.
+    """
     start = _STARTING * fps
     played = np.arange(int(count + 0.5 * start)) / start
     frames = start * np.where(played < 1.0, played**3 - 0.5 * played**4, played - 0.5)
@@ -179,7 +204,7 @@ def _shown(count: int, fps: float) -> np.ndarray:
 
 
 def _trusted(motion: Motion) -> int:
-    """Number of frames before a joint jumps within the last tenth of a second, where markers are lost and swapped."""
+    """Count the frames before a joint jumps within the last tenth of a second, where markers are lost and swapped."""
     count = min(int(_SWAPPED_SECONDS * motion.fps), len(motion) - 3)
     last = motion.frames(len(motion) - count, len(motion))
     places, _ = pose_kinematics(motion.skeleton, last.root_positions, last.rotations)
@@ -188,12 +213,14 @@ def _trusted(motion: Motion) -> int:
 
 
 def _measured(motion: Motion) -> int:
-    """Frames over which the recording's last speeds are taken."""
+    """Count the frames over which the recording's last speeds are measured."""
     return int(np.clip(round(_MEASURED * motion.fps), 1, len(motion) - 1))
 
 
 def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Unit vectors (T, 3) in the world: along the trunk to the neck, to the body's left, and ahead of the chest."""
+    """Compute unit vectors (T, 3) in the world: along the trunk to the neck, to the body's left, and ahead of the
+    chest.
+    """
     body = identify(skeleton)
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     top = body.neck_or_chest
@@ -204,22 +231,23 @@ def _axes(skeleton: Skeleton, rotations: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _to_middle(skeleton: Skeleton, body: Humanoid, rotations: np.ndarray) -> np.ndarray:
-    """(T, 3) m from the root to the body's middle; rotations (T, J, 4) local."""
+    """Compute the vector (T, 3) m from the root to the body's centre; rotations (T, J, 4) local."""
     places, _ = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     top = body.neck_or_chest
     return places[:, body.hips] + _MIDDLE * (places[:, top] - places[:, body.hips])
 
 
 def _headed(skeleton: Skeleton, rotations: np.ndarray) -> float:
-    """Radians about the vertical of where the head points, of a body that lies or nearly does; rotations (J, 4)."""
+    """Compute the direction of the head, rad about the vertical, of a body that lies or nearly does; rotations (J, 4).
+    """
     along = _axes(skeleton, rotations[None])[0][0]
     return float(np.arctan2(along[1], along[0]))
 
 
 def _lying_poses(motion: Motion, ways_up: Sequence[Motion]) -> tuple[np.ndarray, np.ndarray]:
-    """Local rotations (J, 4) of landing and of lying, on the side that is lower, the head where it points."""
+    """Build local rotations (J, 4) of landing and of lying, on the lower side, the head in its current direction."""
     left = _axes(motion.skeleton, motion.rotations[-1:])[1][0]
-    neutral = neutral_stance(motion.skeleton, concatenate([motion, *ways_up]))  # upright at least in the ways up
+    neutral = neutral_stance(motion.skeleton, concatenate([motion, *ways_up]))  # upright at least there
     poses = []
     for settled in (False, True):
         pose = on_the_side(neutral, bool(left[2] < 0.0), settled)
@@ -229,14 +257,14 @@ def _lying_poses(motion: Motion, ways_up: Sequence[Motion]) -> tuple[np.ndarray,
 
 
 def _turned(rotations: np.ndarray, angle: float) -> np.ndarray:
-    """Local rotations (..., J, 4) of the body turned by `angle` radians about the vertical."""
+    """Rotate local rotations (..., J, 4) of the body by `angle` rad about the vertical."""
     out = rotations.copy()
     out[..., 0, :] = quaternion.multiply(quaternion.about_up(np.array(angle)), rotations[..., 0, :])
     return out
 
 
 def _begin(way: Motion) -> float:
-    """The frame from which a way up is worth playing: a little before the hips rise from where they lie."""
+    """Find the frame at which to start a recording of getting up: a little before the hips rise."""
     height = way.root_positions[:, 2]
     lain = int(np.argmin(height[: max(len(height) // 2, 1)]))
     rising = lain + int(np.argmax(height[lain:] > height[lain] + _RISEN))
@@ -244,8 +272,8 @@ def _begin(way: Motion) -> float:
 
 
 def _nearest_way(ways: Sequence[Motion], lying: np.ndarray, fps: float) -> tuple[int, Motion]:
-    """Which way up needs least turning over from lying (J, 4), and its motion at `fps` from where it is worth
-    playing."""
+    """Find the recording of getting up that needs least rolling over from lying (J, 4), cut to its start and at `fps`.
+    """
     found = []
     for number, way in enumerate(ways):
         cut = way.frames(int(round(_begin(way))), len(way))
@@ -258,15 +286,20 @@ def _nearest_way(ways: Sequence[Motion], lying: np.ndarray, fps: float) -> tuple
 
 
 def _headed_as(way: Motion, lying: np.ndarray) -> Motion:
-    """The way up turned about the vertical so that its head points where that of the lying body (J, 4) does."""
+    """Turn a recording about the vertical so that its head points in the direction of the lying body (J, 4)."""
     angle = _headed(way.skeleton, lying) - _headed(way.skeleton, way.rotations[0])
     root = quaternion.rotate(quaternion.about_up(np.array(angle)), way.root_positions)
     return Motion(way.skeleton, root, _turned(way.rotations, angle), way.fps)
 
 
 def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up: Motion, shown) -> np.ndarray:
-    """Root (N, 3) m behind the recording. flight, settling: frames of each; up: the way up, and the fractional frame of
-    it shown (R,) in what is left."""
+    """Compute the root (N, 3) m after the recording.
+
+    Args:
+        flight, settling: number of frames of each.
+        up: recording of getting up.
+        frames_shown: (R,) its fractional frames in the frames that are left.
+    """
     skeleton, body, fps = motion.skeleton, identify(motion.skeleton), motion.fps
     seconds = np.arange(1, len(rotations) + 1) / fps
     middle = _to_middle(skeleton, body, rotations)
@@ -285,14 +318,16 @@ def _root(motion: Motion, fall: _Fall, rotations, flight: int, settling: int, up
 
 
 def _cushioned(free: np.ndarray, ground: np.ndarray, ease: np.ndarray) -> np.ndarray:
-    """Heights (T,) that follow `free` above and `ground` below, and never go below the ground; the change is spread
-    over some centimetres, eased in (T,) from the recording's end."""
+    """Blend heights (T,): `free` where it is above `ground`, otherwise `ground`, and never below.
+
+    The change is spread over some centimetres, and eased in (T,) from the recording's end.
+    """
     above = free - ground
     return ground + 0.5 * (above + np.hypot(above, 2.0 * _CUSHION * ease))
 
 
 def _carried(before: np.ndarray, way: np.ndarray, fps: float) -> np.ndarray:
-    """Places (R, 2) m that go on from the last of `before` (3, 2) as the way (R, 2) goes, its speed fading in."""
+    """Continue places (3, 2) m along a path (R, 2); the difference in speed fades."""
     speed = (before[-1] - before[-2]) * fps
     bend = (before[-1] - 2.0 * before[-2] + before[-3]) * fps**2
     left = Offset(np.zeros(2), speed, bend).faded(np.arange(1, len(way) + 1) / fps, _RATES[2]).place

@@ -1,6 +1,6 @@
-"""Made moves that stop to be made: a header, a throw-in, getting up; and a celebration on the run.
+"""Synthetic moves out of standing: a header, a throw-in, getting up; and a celebration while running.
 
-Key poses over seconds from the key moment, laid over standing (or, celebrating, over running).
+Key poses over seconds from the key moment are blended over standing (the celebration: over running).
 """
 
 from __future__ import annotations
@@ -44,11 +44,19 @@ _HEADER = {
     "absorb": ((0.42, 0.20), (0.56, 0.22), (1.0, 0.04), (1.5, 0)),
     "legs": ((-0.24, 0.0), (-0.06, 0.16), (0.08, 0.10), (0.24, 0.0)),
 }
-_FLIGHT = 0.25
+_FLIGHT = 0.25  # s, half the flight of an adult's jump
 
 
 def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
-    """A jump from both feet out of standing, the trunk arched and thrown at the ball at the top, and landing."""
+    """Build a jump from both feet out of standing: the trunk arches, strikes the ball at the top, and the body lands.
+
+    Args:
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation of standing.
+    Returns:
+        The move; its key is the touch.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 1.5
@@ -79,7 +87,9 @@ def header(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -
 
 
 def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np.ndarray, np.ndarray]:
-    """Height of the hips (N,) metres, free fall in the air, and how far (N,) the ankles are drawn up and back there."""
+    """Compute the height of the hips (N,) m, free fall in the air, and how far (N,) the ankles are drawn up and back
+    there.
+    """
     scale = neutral.leg / tables.LEG
     take_off = np.mean(standing) + 0.085 * scale  # on the toes, legs stretched
     speed = tables.GRAVITY * air
@@ -99,8 +109,9 @@ def _jump(times, air: float, standing: np.ndarray, neutral: Neutral) -> tuple[np
 
 
 def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
-    """Ankle (N, 3), pitch (N,) and toe bend (N,) of a foot that rolls up on its ball, hangs in the air and comes down
-    again."""
+    """Compute ankle (N, 3), pitch (N,) and toe bend (N,) of a foot that rolls up on its ball, hangs in the air and
+    lands.
+    """
     ball_ahead, drop = neutral.ball[0, 0], -neutral.ball[0, 2]
     ahead = ball_ahead - ball_ahead * np.cos(pitch) + drop * np.sin(pitch)
     up = neutral.ankle_height - drop + ball_ahead * np.sin(pitch) + drop * np.cos(pitch)
@@ -116,7 +127,19 @@ def _jumping_foot(ankle, yaw, times, air, rise, pitch, tuck, neutral: Neutral):
 
 
 def standing_posture(neutral: Neutral, duration: float, fps: float, seed: int, width: float = 0.0):
-    """Course, footsteps and posture of standing for `duration` seconds with feet `width` metres wider than usual."""
+    """Build standing.
+
+    Args:
+        neutral: neutral stance of the body.
+        duration: s.
+        fps: frames per second.
+        seed: of the variation.
+        width: m added between the feet.
+    Returns:
+        gait_plan: the plan.
+        steps: stances of both feet.
+        posture: the posture.
+    """
     style = GaitStyle(width=width, life=0.6)
     course = plan(0.0, duration, fps, neutral, style=style, seed=seed)
     steps = tuple(footsteps(course, neutral, style, side) for side in (LEFT, RIGHT))
@@ -152,7 +175,15 @@ _THROW = {
 
 
 def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0) -> Gesture:
-    """A throw-in: the ball in both hands behind the head, the left foot steps ahead, the trunk whips; key: release."""
+    """Build a throw-in: the ball in both hands behind the head, the left foot steps ahead, the trunk whips.
+
+    Args:
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation of standing.
+    Returns:
+        The move; its key is the release.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton())
     scale = neutral.leg / tables.LEG
     key = 2.2
@@ -181,8 +212,17 @@ def throw_in(skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0)
 
 
 def walked_steps(course: Course, neutral: Neutral, side: int, key: float, moves) -> Footsteps:
-    """Stances of one foot that stands still but for `moves`: rows (leaves, lands, metres ahead), seconds from the
-    key."""
+    """Build the stances of one foot that stays in place except for some steps.
+
+    Args:
+        gait_plan: the plan.
+        neutral: neutral stance of the body.
+        side: 0 left, 1 right.
+        key: s of the key moment.
+        moves: rows (leaves, lands, metres ahead), seconds from the key.
+    Returns:
+        The stances.
+    """
     scale = neutral.leg / tables.LEG
     sign = 1.0 if side == LEFT else -1.0
     left = sign * 0.5 * tables.at_speed("width", 0.0) * scale
@@ -232,10 +272,17 @@ _UP_TIME = 3.9
 def getting_up(
     skeleton: Skeleton | None = None, fps: float = 60.0, seed: int = 0, rest: float = 0.8, example: Motion | None = None
 ) -> Gesture:
-    """From lying on the back, face up, to standing: sitting up on the hands, feet drawn in, over the crouch; key:
-    halfway.
+    """Build getting up from lying on the back: sitting up on the hands, feet drawn in, through the crouch.
 
-    rest: seconds of lying before. example: a recording of the skeleton, for its neutral stance."""
+    Args:
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation of standing.
+        rest: s of lying before.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The move; its key is halfway.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     scale = neutral.leg / tables.LEG
     duration = rest + _UP_TIME + 0.9
@@ -265,7 +312,16 @@ def getting_up(
 
 
 def celebration(duration: float = 6.0, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
-    """Running in a bow with both arms spread like wings, leaning into the curve."""
+    """Build a run in a curve with both arms spread like wings, leaning into it.
+
+    Args:
+        duration: s.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the gait's variation.
+    Returns:
+        The motion.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton())
     times = np.arange(int(round(duration * fps)) + 1) / fps
     turn = 0.55 * np.sin(2.0 * np.pi * times / duration)

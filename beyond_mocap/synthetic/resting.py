@@ -1,4 +1,4 @@
-"""How a body rests on the ground: how thick it is at each joint, how low it can lie, and lying on the side as a pose.
+"""A body on the ground: how thick it is at each joint, how low it can lie, and a pose of lying on the side.
 
 A skeleton has no flesh; a joint lies as far above the ground as the body is thick there, in round figures for an adult.
 """
@@ -24,14 +24,21 @@ THICKNESS = {
 }
 """Metres from a joint to the skin below it."""
 
-_OTHERS, _TIP = 0.02, 0.01
-_RAISED = np.radians(np.arange(0.0, 100.0, 1.0))  # by how much an arm may be turned up
-_EVEN_SECONDS = 0.3
+_OTHERS, _TIP = 0.02, 0.01  # m: thickness at other joints and at tips
+_RAISED = np.radians(np.arange(0.0, 100.0, 1.0))  # rad by which an arm can be turned up
+_EVEN_SECONDS = 0.3  # s over which corrections are smoothed
 
 
 def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) -> np.ndarray:
-    """Height (T,) m of the root at which the lowest part of the body touches the ground; rotations (T, J, 4) local.
-    arms: whether they count, which give way where a body falls or rolls onto them (`arms_above_ground`)."""
+    """Compute the height of the root at which the lowest part of the body touches the ground.
+
+    Args:
+        skeleton: the skeleton.
+        rotations: (T, J, 4) local.
+        arms: whether arms count; they yield where a body falls or rolls onto them (`raise_arms`).
+    Returns:
+        (T,) m.
+    """
     places, world = pose_kinematics(skeleton, np.zeros((len(rotations), 3)), rotations)
     without = set() if arms else {joint for chain in _arms(skeleton) for joint in chain}
     points = [(place, thick) for joint, place, thick in _surface(skeleton, places, world) if joint not in without]
@@ -39,8 +46,16 @@ def lowest_root(skeleton: Skeleton, rotations: np.ndarray, arms: bool = True) ->
 
 
 def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, fps: float) -> np.ndarray:
-    """Local rotations (T, J, 4) with arms that reach below the ground turned up at the shoulder, evenly over time, so
-    that little of them is left below; root (T, 3) m, rotations (T, J, 4) local."""
+    """Turn arms that reach below the ground up at the shoulder, smoothly over time, so that little of them stays below.
+
+    Args:
+        skeleton: the skeleton.
+        root: (T, 3) m.
+        rotations: (T, J, 4) local.
+        fps: frames per second.
+    Returns:
+        (T, J, 4) local rotations.
+    """
     places, world = pose_kinematics(skeleton, root, rotations)
     out = rotations.copy()
     for chain in _arms(skeleton):
@@ -51,6 +66,7 @@ def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarra
         along = np.stack([np.sum(p[:, :2] * level, axis=1) for p, _ in points], axis=1)[..., None]
         above = np.stack([p[:, 2] for p, _ in points], axis=1)[..., None]
         thick = np.array([t for _, t in points])[:, None]
+        # height of each point of the arm for each angle in _ARM_ANGLES: (T, points, angles)
         raised = above * np.cos(_RAISED) + along * np.sin(_RAISED) - thick + shoulder[:, 2, None, None]
         angle = _RAISED[_first_enough(raised.min(axis=1))]
         axis = np.stack([level[:, 1], -level[:, 0], np.zeros(len(level))], axis=1)
@@ -63,19 +79,19 @@ def arms_above_ground(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarra
 
 
 def widened(values: np.ndarray, fps: float) -> np.ndarray:
-    """An even curve (T,) that is nowhere below `values` (T,) >= 0: the greatest around each frame, then their mean."""
+    """Compute a smooth curve (T,) that is nowhere below `values` (T,) >= 0: a running maximum, then a running mean."""
     width = 2 * int(_EVEN_SECONDS * fps / 2) + 1
     return uniform_filter1d(maximum_filter1d(values, width), width)
 
 
 def _first_enough(height: np.ndarray) -> np.ndarray:
-    """The first column (T,) of height (T, A) m that is not below the ground; the highest where all are."""
+    """Find the first column (T,) of height (T, A) m that is not below the ground; the highest if all are below."""
     enough = height >= 0.0
     return np.where(enough.any(axis=1), np.argmax(enough, axis=1), np.argmax(height, axis=1))
 
 
 def _arms(skeleton: Skeleton) -> list[list[int]]:
-    """The joints of both arms from the upper arm on, fingers too."""
+    """List the joints of both arms from the upper arm on, with fingers."""
     body = identify(skeleton)
     tops = [limb.upper_arm for limb in (body.left, body.right) if limb.upper_arm is not None]
     return [[joint for joint in range(top, len(skeleton)) if _below(skeleton, joint, top)] for top in tops]
@@ -88,7 +104,7 @@ def _below(skeleton: Skeleton, joint: int, top: int) -> bool:
 
 
 def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
-    """(joint, place (T, 3) m, thickness m) of every joint and every tip."""
+    """Iterate over (joint, place (T, 3) m, thickness m) of every joint and every tip."""
     for joint, thick in enumerate(thickness(skeleton)):
         yield joint, places[:, joint], thick
     for joint, tip in zip(skeleton.end_parents, skeleton.end_offsets):
@@ -96,7 +112,7 @@ def _surface(skeleton: Skeleton, places: np.ndarray, world: np.ndarray):
 
 
 def thickness(skeleton: Skeleton) -> np.ndarray:
-    """(J,) m from each joint to the skin."""
+    """Compute the distance (J,) m from each joint to the skin."""
     body = identify(skeleton)
     parts = [("chest", joint) for joint in body.spine]
     parts += [(role, getattr(limb, role)) for limb in (body.left, body.right) for role in THICKNESS
@@ -118,14 +134,23 @@ _LYING = {
     "arms": ((160, 10, 0, 50), (88, -4, 22, 70)), "ankles": ((0.10, 0.62, -0.13), (0.20, 0.52, -0.07)), "roll": 22.0,
     "spine": (14.0, 0.0), "head": (10.0, 6.0),
 }
-# degrees by which the trunk may slope up to the shoulder, and the lower arm be drawn in, for the body to lie low
+# degrees that are tried so that the body lies low: the trunk sloping up to the shoulder, the lower arm drawn in
 _SLOPES, _DRAWN_IN = np.meshgrid(np.arange(-6.0, 22.0, 4.0), np.arange(-5.0, 46.0, 10.0))
 
 
 def on_the_side(neutral: Neutral, left: bool, settled: bool) -> np.ndarray:
-    """Local rotations (J, 4) of lying on the left or right side, facing along +X: as one lands, arms stretched beyond
-    the head, or settled, arms and knees drawn in and rolled a little to the front. Of several slopes of the trunk and
-    places of the lower arm, which differ by skeleton, the one in which the body lies lowest."""
+    """Build a pose of lying on one side, facing along +X.
+
+    Of several slopes of the trunk and places of the lower arm, which differ by skeleton, the one with the lowest body
+    wins.
+
+    Args:
+        neutral: neutral stance of the body.
+        left: whether on the left side.
+        settled: False: landing, arms stretched beyond the head; True: arms and knees drawn in, rolled a little forward.
+    Returns:
+        (J, 4) local rotations.
+    """
     table = _LYING if settled else _LANDING
     ways = to_motion(_side_posture(table, neutral, left), neutral)
     body = identify(neutral.skeleton)
@@ -136,7 +161,7 @@ def on_the_side(neutral: Neutral, left: bool, settled: bool) -> np.ndarray:
 
 
 def _side_posture(table: dict, neutral: Neutral, left: bool) -> Posture:
-    """The ways (a frame each) of lying that `table` leaves open."""
+    """Build all variants of lying of a table, one frame each."""
     sign, scale, count = 1.0 if left else -1.0, neutral.leg / tables.LEG, _SLOPES.size
     arms, ankles, feet = np.zeros((count, 2, 5)), np.zeros((count, 2, 3)), np.zeros((count, 2, 3))
     hips = np.tile([0.0, 0.0, 0.2], (count, 1))

@@ -1,8 +1,8 @@
-"""Synthetic people who throw or kick: each has a body, a fastest throw or kick and a manner of their own.
+"""Synthetic performers who throw or kick: each has a body, a fastest throw or kick and a manner of their own.
 
-They do the same thing alike, but not the same twice: harder throws are wound up further (longer stride, more turn of
-pelvis and chest, arm turned out further), and a little chance is in all of it. So what a network learns on one subject,
-and what it is asked for another, are known truths.
+They perform the same action alike, but never twice the same: harder throws have a larger wind-up (longer stride, more
+turn of pelvis and chest, arm turned out further), and everything has some random variation. So what a network learns
+from one performer, and what it has to predict for another, is ground truth.
 """
 
 from __future__ import annotations
@@ -18,21 +18,29 @@ from .kicks import KickStyle
 from .throws import STYLES, Throw, ThrowStyle, throw
 
 _KICK_SCATTER = {"approach": 2.0, "stride": 0.04, "back": 0.04, "follow": 0.05, "lean": 1.5, "off_arm": 0.06}
-"""Standard deviation of the chance from kick to kick."""
-_WHIP = 0.05  # s around the contact in which the leg goes through the ball
-_LEAST_KICK = 8.0  # m/s of the ball, the slowest kick that is swung at all
+"""Standard deviation of the variation from kick to kick."""
+_WHIP = 0.05  # s around the contact in which the leg swings through the ball
+_LEAST_KICK = 8.0  # m/s of the ball in a kick with no effort
 
 _THROW_SCATTER = {
     "slot": 2.0, "stride": 0.04, "lift": 0.08, "wind_up": 0.04, "lean": 0.06, "off_arm": 0.06, "follow": 0.05,
 }  # fmt: skip
-"""Standard deviation of the chance from throw to throw."""
-_LEAST_THROW = 9.0  # m/s, the slowest throw that is wound up at all
+"""Standard deviation of the variation from throw to throw."""
+_LEAST_THROW = 9.0  # m/s of the ball in a throw with no effort
 
 
 @dataclass(frozen=True, eq=False)
 class Person:
-    """stature: metres. side: "left" or "right", the hand that throws or the foot that kicks; made people use the right
-    one. fastest: m/s that the ball gets at most. manner: how this person does it."""
+    """A synthetic performer.
+
+    Attributes:
+        name: name.
+        stature: body height, m.
+        skeleton: skeleton.
+        side: "left" or "right", the throwing hand or kicking foot; synthetic performers use the right one.
+        fastest: highest speed of the ball, m/s.
+        manner: how this performer throws or kicks.
+    """
 
     name: str
     stature: float
@@ -43,7 +51,7 @@ class Person:
 
 
 def make_adult(fastest: float, manner) -> Person:
-    """The project's own adult, in the manner of the tables."""
+    """Build the performer with the project's own adult skeleton, in the manner of the tables."""
     return Person("adult", STATURE, adult_skeleton(), side="right", fastest=fastest, manner=manner)
 
 
@@ -51,8 +59,17 @@ def make_person(
     name: str, manner: type, ranges: Mapping[str, tuple[float, float]], fastest: tuple[float, float],
     chance: np.random.Generator,
 ) -> Person:
-    """Somebody of 1.6 to 2.0 m by chance. ranges: lowest and highest of each field of the manner. fastest: the same of
-    the ball, m/s."""
+    """Build a random performer of 1.6 to 2.0 m.
+
+    Args:
+        name: name.
+        manner: class of the manner.
+        ranges: lowest and highest value of each field of the manner.
+        fastest: lowest and highest value of the performer's highest ball speed, m/s.
+        chance: random generator.
+    Returns:
+        The performer.
+    """
     stature = float(chance.uniform(1.60, 2.00))
     own = manner(**{field: float(chance.uniform(low, high)) for field, (low, high) in ranges.items()})
     hardest = float(chance.uniform(*fastest))
@@ -60,11 +77,17 @@ def make_person(
 
 
 def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
-    """An adult of `stature` metres whose limbs and trunk are some percent longer or shorter than usual, both sides
-    alike."""
+    """Build an adult whose limbs and trunk are some percent longer or shorter than average, the same on both sides.
+
+    Args:
+        stature: m.
+        chance: random generator.
+    Returns:
+        The skeleton.
+    """
     usual = adult_skeleton(stature)
     legs, arms, wide = chance.uniform([0.965, 0.95, 0.94], [1.035, 1.05, 1.06])
-    trunk = 1.0 - 0.9 * (legs - 1.0)  # long legs make a short trunk
+    trunk = 1.0 - 0.9 * (legs - 1.0)  # long legs go with a short trunk
     offsets = np.array(usual.offsets)
     for joint, name in enumerate(usual.names):
         part = name.removeprefix("Left").removeprefix("Right")
@@ -80,7 +103,15 @@ def make_body(stature: float, chance: np.random.Generator) -> Skeleton:
 
 
 def scatter_manner(manner, scatter: dict[str, float], chance: np.random.Generator):
-    """The same manner a little otherwise, by normal chance of the standard deviations `scatter` up to twice as far."""
+    """Vary a manner randomly.
+
+    Args:
+        manner: the manner.
+        scatter: standard deviation of each field; limited to twice as much.
+        chance: random generator.
+    Returns:
+        The varied manner.
+    """
     off = np.clip(chance.standard_normal(len(scatter)), -2.0, 2.0)
     return replace(
         manner, **{name: getattr(manner, name) + float(by) * scatter[name] for name, by in zip(scatter, off)}
@@ -88,15 +119,22 @@ def scatter_manner(manner, scatter: dict[str, float], chance: np.random.Generato
 
 
 def scale_rows(rows: tuple, *factors: float) -> tuple:
-    """Rows (time, values...) with every value times its factor."""
+    """Scale rows (time, values...): every value times its factor."""
     return tuple((row[0], *(value * factor for value, factor in zip(row[1:], factors))) for row in rows)
 
 
 @dataclass(frozen=True, kw_only=True)
 class KickManner:
-    """How somebody kicks: approach, degrees that the way up is turned more than usual; factors on stride, back (how far
-    leg and pelvis are swung back) and follow (how high the leg goes after the ball); lean, degrees that the trunk is
-    inclined more to the standing leg; off_arm, a factor on how far the arms are held out."""
+    """How a performer kicks.
+
+    Attributes:
+        approach: degrees added to the run-up's turn.
+        stride: factor.
+        back: factor on how far leg and pelvis swing back.
+        follow: factor on how high the leg swings after the ball.
+        lean: degrees that the trunk is inclined more to the support leg.
+        off_arm: factor on how far the arms are held out.
+    """
 
     approach: float = 0.0
     stride: float = 1.0
@@ -110,24 +148,41 @@ _KICK_RANGES = {
     "approach": (-9.0, 8.0), "stride": (0.86, 1.08), "back": (0.86, 1.04), "follow": (0.75, 1.15), "lean": (-5.0, 5.0),
     "off_arm": (0.75, 1.08),
 }  # fmt: skip
-"""Between which people differ."""
+"""Lowest and highest value of each field."""
 
 
 def make_kicker(seed: int) -> Person:
-    """Somebody who kicks; the same seed gives the same person. Seed 0 is the project's own adult."""
+    """Build a performer who kicks; the same seed gives the same one. Seed 0 has the project's own adult skeleton."""
     if seed == 0:
         return make_adult(28.0, KickManner())
     return make_person(f"kicker{seed:02d}", KickManner, _KICK_RANGES, (22.0, 28.0), np.random.default_rng([seed, 1863]))
 
 
 def vary_kick(who: Person, base: KickStyle, speed: float, chance: np.random.Generator) -> KickStyle:
-    """How this person kicks a ball of `speed` m/s in the style `base`; `chance` makes it differ from the one before."""
+    """Vary how a performer kicks.
+
+    Args:
+        performer: the performer.
+        base: style of the kick.
+        speed: of the ball, m/s.
+        chance: random generator, for the difference from kick to kick.
+    Returns:
+        The performer's style for this kick.
+    """
     effort = float(np.clip((speed - _LEAST_KICK) / (who.fastest - _LEAST_KICK), 0.0, 1.0))
     return style_kick(base, scatter_manner(who.manner, _KICK_SCATTER, chance), effort)
 
 
 def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> KickStyle:
-    """`base` kicked in somebody's manner with `effort` 0..1 of a hard kick's swing."""
+    """Adapt a kick's style to a manner.
+
+    Args:
+        base: style of the kick.
+        manner: the manner.
+        effort: 0 to 1 of a hard kick's swing.
+    Returns:
+        The style.
+    """
     back, follow = manner.back * (0.78 + 0.22 * effort), manner.follow * (0.66 + 0.34 * effort)
     out, turn = manner.off_arm * (0.7 + 0.3 * effort), 0.75 + 0.25 * effort * manner.back
     approach = base.approach + manner.approach
@@ -143,7 +198,7 @@ def style_kick(base: KickStyle, manner: KickManner, effort: float = 1.0) -> Kick
 
 
 def _swung(rows: tuple, back: float, whip: float, follow: float) -> tuple:
-    """Rows (time, thigh, knee) of the leg: so much of the swing back, of the whip through the ball, of the way up."""
+    """Scale rows (time, thigh, knee) of the leg: backswing, whip through the ball, and follow-through."""
     at = next(row for row in rows if row[0] == 0.0)
     out = []
     for time, thigh, knee in rows:
@@ -157,20 +212,29 @@ def _swung(rows: tuple, back: float, whip: float, follow: float) -> tuple:
 
 
 def _turned(time: float, about: float, turn: float, approach: float) -> float:
-    """The pelvis's turn: on the way up the approach's, from then on so much of the style's."""
+    """Compute the pelvis' turn: the approach's on the run-up, then the style's."""
     way_up = float(np.clip((-0.2 - time) / 0.2, 0.0, 1.0))
     return about * (way_up + (1.0 - way_up) * turn) - way_up * approach
 
 
 def _near_zero(time: float) -> float:
+    """Weight of a time (s) near the contact or release."""
     return float(np.exp(-0.5 * (time / 0.25) ** 2))
 
 
 @dataclass(frozen=True, kw_only=True)
 class ThrowManner:
-    """How somebody throws: slot, degrees that the trunk leans away from the arm at release, more than usual; factors on
-    stride, lift (of the leading leg), wind_up (seconds before the foot is down), lean (forward, after release), off_arm
-    (how far the other arm is held out) and follow (seconds after release)."""
+    """How a performer throws.
+
+    Attributes:
+        slot: degrees added to the trunk's lean away from the arm at release.
+        stride: factor.
+        lift: factor, of the leading leg.
+        wind_up: factor on the seconds before the foot is down.
+        lean: factor, forward, after release.
+        off_arm: factor on how far the other arm is held out.
+        follow: factor on the seconds after release.
+    """
 
     slot: float = 0.0
     stride: float = 1.0
@@ -185,11 +249,11 @@ _THROW_RANGES = {
     "slot": (-7.0, 7.0), "stride": (0.85, 1.10), "lift": (0.45, 1.15), "wind_up": (0.80, 1.15), "lean": (0.75, 1.15),
     "off_arm": (0.80, 1.10), "follow": (0.90, 1.15),
 }  # fmt: skip
-"""Between which people differ."""
+"""Lowest and highest value of each field."""
 
 
 def make_thrower(seed: int) -> Person:
-    """Somebody who throws; the same seed gives the same person. Seed 0 is the project's own adult."""
+    """Build a performer who throws; the same seed gives the same one. Seed 0 has the project's own adult skeleton."""
     if seed == 0:
         return make_adult(34.0, ThrowManner())
     chance = np.random.default_rng([seed, 1907])
@@ -199,9 +263,19 @@ def make_thrower(seed: int) -> Person:
 def make_throw(
     thrower: Person, target: tuple[float, float, float], speed: float, chance: np.random.Generator, fps: float = 120.0
 ) -> Throw:
-    """A throw of this subject at `target` (3,) m with `speed` m/s; `chance` makes it differ from the one before.
+    """Build a throw of a performer.
 
-    InputError as for `throws.throw`."""
+    Args:
+        thrower: the performer.
+        target: (3,) m.
+        speed: of the ball, m/s.
+        chance: random generator, for the difference from throw to throw.
+        fps: frames per second.
+    Returns:
+        The throw.
+    Raises:
+        InputError: as for `throws.build_throw`.
+    """
     manner = scatter_manner(thrower.manner, _THROW_SCATTER, chance)
     effort = float(np.clip((speed - _LEAST_THROW) / (thrower.fastest - _LEAST_THROW), 0.0, 1.0))
     style = style_throw(STYLES["overarm"], manner, effort)
@@ -209,7 +283,15 @@ def make_throw(
 
 
 def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> ThrowStyle:
-    """`base` thrown in somebody's manner with `effort` 0..1 of a hard throw's winding up."""
+    """Adapt a throw's style to a manner.
+
+    Args:
+        base: style of the throw.
+        manner: the manner.
+        effort: 0 to 1 of a hard throw's wind-up.
+    Returns:
+        The style.
+    """
     turn, out = 0.62 + 0.38 * effort, 0.78 + 0.22 * effort
     way = manner.stride * (0.62 + 0.38 * effort)
     raised = manner.lift * (0.25 + 0.75 * effort)
@@ -228,7 +310,7 @@ def style_throw(base: ThrowStyle, manner: ThrowManner, effort: float = 1.0) -> T
 
 
 def _paced(rows: tuple, manner: ThrowManner) -> tuple:
-    """The wind-up (before 0.35 s to release) and the follow-through (after 0.2 s) slower or faster."""
+    """Scale the duration of the wind-up (before 0.35 s to release) and of the follow-through (after 0.2 s)."""
 
     def later(time: float) -> float:
         time = time if time > -0.35 else -0.35 + manner.wind_up * (time + 0.35)

@@ -1,11 +1,11 @@
-"""Made throws: a whole body that strides, turns hips and trunk, and lets one arm follow like a whip, at a target.
+"""Synthetic throws at a target: a whole body that strides, turns hips and trunk, and lets one arm follow like a whip.
 
 Instants, angles and rates of the hard overarm throw follow Dillman, Fleisig and Andrews 1993 (J. Orthop. Sports Phys.
 Ther. 18, 402-408) and Fleisig, Barrentine, Zheng, Escamilla and Andrews 1999 (J. Biomech. 32, 1371-1375): foot down
-0.15 s before release with the upper arm level, pelvis then trunk turning at some 600 and 1200 degrees a second, the arm
-turned out by 170 degrees 0.03 s before release, the elbow at 25 degrees as the ball leaves. A throw is aimed as people
-aim: the body turns to the target, and the ball leaves a little earlier or later in the swing. `grip_of` says where a
-hand holds a ball, between the fingers on the palm's side, on any humanoid skeleton.
+0.15 s before release with the upper arm level, pelvis then trunk turning at about 600 and 1200 degrees per second, the
+arm turned out by 170 degrees 0.03 s before release, the elbow at 25 degrees as the ball leaves. A throw is aimed as
+humans aim: the body turns to the target, and the ball leaves a little earlier or later in the swing. `find_grip` gives
+where a hand holds a ball, between the fingers on the palm's side, on any humanoid skeleton.
 """
 
 from __future__ import annotations
@@ -30,23 +30,29 @@ from .gestures import RIGHT, begin_plan, choose_style
 BEFORE, AFTER = 1.6, 1.2
 """Seconds of a hard throw before and after release; slower ones take longer."""
 SLOWEST, FASTEST = 3.0, 45.0  # m/s at release
-_PLAN = 480.0  # frames a second at which a throw is planned
+_PLAN = 480.0  # Hz at which a throw is planned
 _ROUND = 0.007  # s over which corners of the tables are rounded
-_EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball may leave
-_ROUNDS = 12
-_AHEAD, _DOWN = 0.012, 0.105  # metres of an adult whose hand hangs: thumb's side, towards the fingertips
+_EARLIEST, _LATEST = -0.022, 0.022  # s around the table's release within which the ball can leave
+_ROUNDS = 12  # rounds of aiming: instant, rate and turn depend on one another
+_AHEAD, _DOWN = 0.012, 0.105  # m of an adult whose hand hangs: toward the thumb, toward the fingertips
 USUAL_GRIP = 0.036
-"""Metres from the palm's middle to the centre of a baseball; larger balls lie further out by their radius."""
+"""Metres from the palm's middle to the centre of a baseball; larger balls are further out by their radius."""
 
 
 @dataclass(frozen=True)
 class ThrowStyle:
-    """How a right arm throws towards +X; seconds from release, degrees, metres of an adult.
+    """How a right arm throws along +X; seconds from release, degrees, metres of an adult.
 
-    pelvis, spine: rows (time, list, tilt, turn), the pelvis against the throwing direction, the chest against the
-    pelvis. right_arm, left_arm: rows (time, brought forward across, abduction, inward turn, elbow). forearm: rows
-    (time, turn, flexion of the wrist). hips: rows (time, ahead, lowered). left_foot, right_foot: rows (time, ahead,
-    left, raised, pitch, yaw)."""
+    Attributes:
+        pelvis: rows (time, list, tilt, turn), against the throwing direction.
+        spine: rows (time, list, tilt, turn), the chest against the pelvis.
+        right_arm: rows (time, brought forward across, abduction, inward turn, elbow).
+        left_arm: rows (time, brought forward across, abduction, inward turn, elbow).
+        forearm: rows (time, turn, flexion of the wrist).
+        hips: rows (time, ahead, lowered).
+        left_foot: rows (time, ahead, left, raised, pitch, yaw).
+        right_foot: rows (time, ahead, left, raised, pitch, yaw).
+    """
 
     pelvis: tuple
     spine: tuple
@@ -106,10 +112,16 @@ STYLES = {"overarm": _OVERARM, "sidearm": _SIDEARM}
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Throw:
-    """A made throw.
+    """A synthetic throw.
 
-    motion: the body. release: seconds at which the ball leaves the hand. arm: "left" or "right". position, velocity:
-    (3,) m and m/s of the ball's centre then. grip: (3,) metres, the ball's centre in the hand joint's own axes."""
+    Attributes:
+        motion: the body.
+        release: s at which the ball leaves the hand.
+        arm: "left" or "right".
+        position: (3,) m, the ball's centre at release.
+        velocity: (3,) m/s of the ball at release.
+        grip: (3,) m, the ball's centre in the hand joint's own axes.
+    """
 
     motion: Motion
     release: float
@@ -123,11 +135,20 @@ def throw(
     target: tuple[float, float, float] = (18.0, 0.0, 1.0), speed: float = 25.0, arm: str = "right",
     style: str | ThrowStyle = "overarm", skeleton: Skeleton | None = None, fps: float = 120.0,
 ) -> Throw:
-    """A throw out of standing at the origin, such that a ball without air flies through `target` (3,) metres.
+    """Build a throw out of standing at the origin whose ball, without air, flies through the target.
 
-    speed: of the ball as it leaves, m/s. fps: frames per second. skeleton: any humanoid one, default the project's
-    adult. style: a name, or somebody's own. InputError for a target that cannot be reached at that speed, an unknown
-    arm or style, a body without hands."""
+    Args:
+        target: (3,) m.
+        speed: of the ball as it leaves, m/s.
+        arm: "left" or "right".
+        style: a name, or a performer's own style.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+    Returns:
+        The throw.
+    Raises:
+        InputError: for a target that cannot be reached at that speed, an unknown arm or style, or a body without hands.
+    """
     how = choose_style("throw", arm, "arm", style=style, styles=STYLES, speed=speed, speeds=(SLOWEST, FASTEST))
     neutral = neutral_stance(skeleton or adult_skeleton())
     swing = _Swing(to_motion(_posture(how, neutral), neutral), neutral, arm)
@@ -136,7 +157,7 @@ def throw(
 
 
 class _Swing:
-    """A hard throw along +X, planned finely, and its ball; slower and turned ones are read from it."""
+    """A hard throw along +X at the planning rate, with its ball; slower and turned ones are sampled from it."""
 
     def __init__(self, motion: Motion, neutral: Neutral, arm: str):
         body = identify(motion.skeleton)
@@ -151,14 +172,14 @@ class _Swing:
         self.velocity = np.gradient(self.ball, 1.0 / _PLAN, axis=0)
 
     def released(self, at: float) -> tuple[np.ndarray, np.ndarray]:
-        """Place (3,) m and velocity (3,) m/s of the ball `at` seconds from the table's release."""
+        """Interpolate the place (3,) m and velocity (3,) m/s of the ball `at` seconds from the table's release."""
         frame = np.clip((BEFORE + at) * _PLAN, 0, len(self.ball) - 2)
         low, share = int(frame), frame - int(frame)
         both = [(1.0 - share) * rows[low] + share * rows[low + 1] for rows in (self.ball, self.velocity)]
         return both[0], both[1]
 
     def at_rate(self, at: float, rate: float, turn: float, fps: float) -> Throw:
-        """The throw at `rate` times the pace, turned by `turn` radians, at `fps`."""
+        """Build the throw at playback rate `rate`, turned by `turn` rad, at `fps`."""
         seconds = np.arange(int(np.floor((len(self.motion) - 1) / _PLAN / rate * fps)) + 1) / fps
         root, rotations = at_frames(self.motion, seconds * rate * _PLAN)
         motion = place(Motion(self.motion.skeleton, root, rotations, fps), turn)
@@ -169,7 +190,7 @@ class _Swing:
 
 
 def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, float, float]:
-    """When in the swing (s), at which rate and turned by what (radians) a ball of `speed` hits the target."""
+    """Find when in the swing (s), at which rate and turned by how much (rad) a ball of `speed` hits the target."""
     instants = np.linspace(_EARLIEST, _LATEST, 89)
     turn = float(np.arctan2(target[1], target[0]))
     at, rate = 0.0, 1.0
@@ -189,7 +210,7 @@ def _aimed(swing: _Swing, target: np.ndarray, speed: float) -> tuple[float, floa
 
 
 def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
-    """Where the elevation (N,) is right: nearest to the table's own release."""
+    """Find the instant at which the elevation error (N,) is zero, nearest to the table's own release."""
     change = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
     if not len(change):
         raise InputError(
@@ -200,7 +221,11 @@ def _first_zero(instants: np.ndarray, off: np.ndarray, speed: float) -> float:
 
 
 def _wanted_elevation(way: np.ndarray, speed: float) -> float:
-    """Elevation (radians) of the flatter arc without air that covers `way` (3,) metres; InputError where none does."""
+    """Compute the elevation (rad) of the flatter arc without air that covers `to_target` (3,) m.
+
+    Raises:
+        InputError: if there is none.
+    """
     level, up = float(np.hypot(way[0], way[1])), float(way[2])
     inside = speed**4 - tables.GRAVITY * (tables.GRAVITY * level**2 + 2.0 * up * speed**2)
     if level < 1e-6 or inside < 0.0:
@@ -209,7 +234,7 @@ def _wanted_elevation(way: np.ndarray, speed: float) -> float:
 
 
 def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
-    """The throw's posture at the planning rate."""
+    """Build the throw's posture at the planning rate."""
     times = np.arange(int(round((BEFORE + AFTER) * _PLAN)) + 1) / _PLAN - BEFORE
     nothing = np.zeros_like(times)
     curve, pelvis, spine, arms, height = begin_plan(style, neutral, times, _ROUND * _PLAN)
@@ -230,13 +255,32 @@ def _posture(style: ThrowStyle, neutral: Neutral) -> Posture:
 
 
 def grip_of(skeleton: Skeleton, side: str, radius: float = USUAL_GRIP) -> np.ndarray:
-    """(3,) m: the centre of a ball of that radius in the axes of the hand joint. InputError for a body without it."""
+    """Compute the centre of a held ball in the axes of the hand joint.
+
+    Args:
+        skeleton: any humanoid skeleton.
+        side: "left" or "right".
+        radius: of the ball, m.
+    Returns:
+        (3,) m.
+    Raises:
+        InputError: if the body has no such hand.
+    """
     return grip_in(neutral_stance(skeleton), side, radius)
 
 
 def grip_in(neutral: Neutral, side: str, out: float | None = None) -> np.ndarray:
-    """As `grip_of`, of a skeleton whose neutral stance is known; out: m from the palm's middle, None: of an adult's
-    baseball, in the body's size."""
+    """Compute the centre of a held ball, for a skeleton whose neutral stance is known.
+
+    Args:
+        neutral: neutral stance of the body.
+        side: "left" or "right".
+        out: m from the palm's middle; None: of an adult's baseball, scaled to the body's size.
+    Returns:
+        (3,) m in the axes of the hand joint.
+    Raises:
+        InputError: if the body has no such hand.
+    """
     hand = getattr(identify(neutral.skeleton), side).hand
     if hand is None:
         raise InputError("throw", f"a body without a {side} hand", "a skeleton with arms and hands")

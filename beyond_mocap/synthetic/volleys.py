@@ -1,7 +1,7 @@
-"""Made strikes out of standing, as passing games need them: foot volleys, a trap, a header, chest, hand and racquet.
+"""Synthetic strikes out of standing for passing games: foot volleys, a trap, a header, chest, hand and racquet.
 
-Each begins and ends standing. The left foot stays where it is; key poses over seconds from the touch are laid over
-standing, the right foot is led through the rows of a table and set down where it was.
+Each begins and ends standing. The left foot stays in place; key poses over seconds from the touch are blended over
+standing, and the right foot is guided through the rows of a table and back to its place.
 """
 
 from __future__ import annotations
@@ -26,18 +26,26 @@ from .moves import standing_posture, walked_steps
 BEFORE, AFTER = 1.6, 1.9
 """Seconds of the clip before and after the touch."""
 
-_BENT = 0.012  # m by which who is ready stands lower than who stands
-_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: the most of it, and over which it is neared
+_BENT = 0.012  # m by which the hips are lower when ready for a ball than in standing
+_STRAIGHTEST, _EASE = 0.985, 0.06  # shares of a leg's length: longest reach, and range over which it is eased
 
 
 @dataclass(frozen=True, kw_only=True)
 class Volley:
-    """How a body that stands strikes with its right side; seconds from the touch, metres of an adult, degrees.
+    """How a standing body strikes with its right side; seconds from the touch, metres of an adult, degrees.
 
-    foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); None: it stays. hips: rows
-    (time, ahead, left, lowered). pelvis, spine: rows (time, list, tilt, turn); head: rows (time, nod, turn). left_arm,
-    right_arm: rows (time, flexion, abduction, inward, elbow). wrist: rows (time, right hand's flexion). words: of the
-    vocabulary. span: seconds in which the body is not as it stands."""
+    Attributes:
+        labels: labels of the vocabulary.
+        span: seconds in which the body differs from standing.
+        hips: rows (time, ahead, left, lowered).
+        pelvis: rows (time, list, tilt, turn).
+        spine: rows (time, list, tilt, turn).
+        head: rows (time, nod, turn).
+        left_arm: rows (time, flexion, abduction, inward, elbow).
+        right_arm: rows (time, flexion, abduction, inward, elbow).
+        foot: rows (time, ahead of the hips, left of them, ankle height, pitch, yaw, roll); None: it stays in place.
+        wrist: rows (time, right hand's flexion).
+    """
 
     words: str
     span: tuple[float, float]
@@ -223,8 +231,18 @@ def volley(
     kind: str, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0, *, speed: float = 1.0,
     example: Motion | None = None,
 ) -> Gesture:
-    """A strike out of standing with the right side, facing +X: `kind` is one of VOLLEYS. speed: factor on how fast the
-    strike's rows are gone through. example: a recording of the skeleton, for its neutral stance."""
+    """Build a strike out of standing with the right side, facing +X.
+
+    Args:
+        kind: one of VOLLEYS.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation of standing.
+        speed: playback rate of the strike's rows.
+        example: a recording on `skeleton`, for its neutral stance.
+    Returns:
+        The move.
+    """
     recipe = VOLLEYS[kind]
     neutral = neutral_stance(skeleton or adult_skeleton(), example)
     course, posture = _ready(neutral, BEFORE + AFTER, fps, seed)
@@ -241,7 +259,16 @@ def volley(
 
 
 def idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, seed: int = 0) -> Motion:
-    """Standing ready for a ball: knees a little bent, the weight going from foot to foot, feet where they are."""
+    """Build standing ready for a ball: knees slightly bent, the weight shifting from foot to foot, feet in place.
+
+    Args:
+        duration: s.
+        skeleton: any humanoid skeleton; default: the project's adult.
+        fps: frames per second.
+        seed: of the variation.
+    Returns:
+        The motion.
+    """
     neutral = neutral_stance(skeleton or adult_skeleton())
     course, posture = _ready(neutral, duration, fps, seed)
     posture = with_feet(posture, course.times, _still(course, neutral), neutral)
@@ -249,7 +276,7 @@ def idle(duration: float, skeleton: Skeleton | None = None, fps: float = 30.0, s
 
 
 def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Course, Posture]:
-    """Standing for `duration` seconds with the knees bent and the weight shifted to and fro."""
+    """Build the plan and posture of standing with bent knees and shifting weight for `duration` seconds."""
     course, _, posture = standing_posture(neutral, duration, fps, seed)
     scale, times = neutral.leg / tables.LEG, course.times
     phase = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, 3)
@@ -264,12 +291,12 @@ def _ready(neutral: Neutral, duration: float, fps: float, seed: int) -> tuple[Co
 
 
 def _still(course: Course, neutral: Neutral) -> tuple[Footsteps, ...]:
-    """Both feet on the ground all the time."""
+    """Build stances of both feet that stay on the ground."""
     return tuple(walked_steps(course, neutral, side, 0.0, ()) for side in (LEFT, RIGHT))
 
 
 def _trunk_and_arms(posture: Posture, recipe: Volley, times, ease, neutral: Neutral) -> Posture:
-    """The posture with the recipe's trunk, head and arms laid over it by `ease` (T,), its hips moved."""
+    """Blend a recipe's trunk, head and arms over a posture by `ease` (T,), and move its hips."""
     scale = neutral.leg / tables.LEG
     moved = scale * ease[:, None] * keyed(recipe.hips, times)
     hips = posture.hips + moved * [1.0, 1.0, -1.0]
@@ -288,7 +315,8 @@ def _trunk_and_arms(posture: Posture, recipe: Volley, times, ease, neutral: Neut
 
 
 def _led_foot(posture: Posture, rows: tuple, times: np.ndarray, neutral: Neutral) -> Posture:
-    """The right foot led from where it stands through `rows` and back, never through the ground nor beyond its leg."""
+    """Guide the right foot from its place through `rows` and back, never through the ground nor beyond the leg's reach.
+    """
     scale, table = neutral.leg / tables.LEG, np.array(rows, dtype=float)
     begin, land = table[0, 0] - 0.16, table[-1, 0] + 0.14
     inside = (times > begin) & (times < land)

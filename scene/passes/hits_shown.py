@@ -1,5 +1,6 @@
-"""Hit analysis of an armature: what the core finds in its motion, kept for the panel, set as markers on its action, and
-painted as a small picture of its curves (Ball handling Fig. 2)."""
+"""Hit analysis of an armature: its result for the panel, as markers on its action, and as a picture of its curves (Ball
+handling, Fig. 2).
+"""
 
 from __future__ import annotations
 
@@ -20,18 +21,28 @@ if TYPE_CHECKING:
     from ...beyond_mocap.motion.motion import Motion
     from ...beyond_mocap.passes.hits import Hits
 
-MARKER = "hit"  # the names of our markers begin with it
-_COLUMNS = 480
+MARKER = "hit"  # the names of this extension's markers begin with it
+_COLUMNS = 480  # most values of a stored curve
 SIZE = 480  # pixels of the picture's width and height
 _GROUND, _GRID = (0.09, 0.09, 0.10), (0.20, 0.20, 0.22)
 _HEIGHT, _SPEED = (0.95, 0.95, 0.95), (0.30, 0.80, 1.0)
 _HIGH, _FAST, _LEVEL = (0.95, 0.25, 0.22), (0.90, 0.30, 0.90), (0.60, 0.52, 0.20)
 _STRETCH, _MOTION = (0.95, 0.25, 0.22), (0.28, 0.45, 0.95)
-_EDGE, _BARS = 6, 44  # pixels round the curves, and of the bars at the foot
+_EDGE, _BARS = 6, 44  # pixels around the curves, and of the bars at the bottom
 
 
 def motion_of(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple["Motion", int]:
-    """What an armature does, at the scene's rate, and the scene frame of its first pose. InputError if it is still."""
+    """Read the motion of an armature.
+
+    Args:
+        scene: the scene; the motion has its frame rate.
+        body: the armature.
+    Returns:
+        motion: the motion.
+        first: scene frame of its first pose.
+    Raises:
+        InputError: if the armature does not move.
+    """
     if body.beyond_mocap_ride.on or (channels.playing(body)[0] is not None and not rides_as_rig(body)):
         return action.read(body, scene), action.first_frame(body)
     read = carrier_of(body).read(scene)
@@ -42,10 +53,18 @@ def analyse(
     scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str, threshold: float = 0.0, bone: str = "",
     markers: bool = True,
 ) -> "Hits":
-    """Find the strikes in an armature's motion, note them for the panel and mark them on its action.
+    """Detect the strikes in an armature's motion, store them for the panel and mark them on its action.
 
-    part, side, bone, threshold: see `beyond_mocap.passes.hits.analyse`; threshold 0: automatic. markers: whether to
-    mark."""
+    Args:
+        scene: the scene.
+        body: the armature.
+        part, side: as in the core's `detect_hits`.
+        threshold: metres above the ground; 0: automatic.
+        bone: joint to use instead of the part; "" for none.
+        markers: whether to set markers.
+    Returns:
+        The hit analysis.
+    """
     from ...beyond_mocap.passes.hits import analyse as find
 
     channels.check_local(body)
@@ -66,8 +85,12 @@ def analyse(
 
 
 def summary(found: "Hits", first: int) -> dict:
-    """What is kept of an analysis: curves of `_COLUMNS` values at most, and frames of the motion. first: scene frame of
-    the motion's first."""
+    """Build what is stored of an analysis: curves of `_COLUMNS` values at most, and frames of the motion.
+
+    Args:
+        found: the hit analysis.
+        first: scene frame of the motion's first frame.
+    """
     count = len(found.height)
     at = np.linspace(0, count - 1, min(count, _COLUMNS))
     curves = {name: np.round(np.interp(at, np.arange(count), getattr(found, name)), 3).tolist()
@@ -80,7 +103,7 @@ def summary(found: "Hits", first: int) -> dict:
 
 
 def lines(found: "Hits", first: int) -> list[str]:
-    """A line for each hit motion: scene frame of its strike, a tab, its speed, and when a ball can be hit."""
+    """Describe each hit motion in a line: scene frame of its strike, a tab, its speed, and when a ball can be hit."""
     told = []
     for one in found.motions:
         low, high = (first + frame for frame in one.ball_stretch)
@@ -89,7 +112,7 @@ def lines(found: "Hits", first: int) -> list[str]:
 
 
 def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
-    """Markers on an action: the strike, and where its ball stretch begins and ends."""
+    """Set markers on an action: at the strike, and where its ball stretch begins and ends."""
     name = " ".join(filter(None, (found.side, found.part)))
     for one in found.motions:
         low, high = one.ball_stretch
@@ -99,7 +122,7 @@ def mark(played: bpy.types.Action, found: "Hits", first: int) -> None:
 
 
 def unmark(played: bpy.types.Action) -> None:
-    """Take the markers that a hit analysis has set off an action; others, and those renamed since, stay."""
+    """Remove the markers that a hit analysis has set on an action; other and renamed markers stay."""
     for marker in list(played.pose_markers):
         record = marker.beyond_mocap
         if record.kind == "none" and record.shown == marker.name and marker.name.startswith(MARKER):
@@ -107,7 +130,7 @@ def unmark(played: bpy.types.Action) -> None:
 
 
 def repaint() -> None:
-    """Paint all analyses, where there is a window to show them: another file is open, or something was undone."""
+    """Paint all analyses if there is a window, after a file was opened or an undo."""
     for thing in () if bpy.app.background else bpy.data.objects:
         if thing.type == "ARMATURE" and thing.beyond_mocap_hits.found:
             paint(thing.beyond_mocap_hits)
@@ -118,7 +141,7 @@ def _pairs(stretches) -> list[list[int]]:
 
 
 def paint(hits: BeyondMocapHits) -> None:
-    """Paint the picture of an analysis, where there is one and it is not painted yet."""
+    """Paint the picture of an analysis, unless it is painted already."""
     name = picture_name(hits)
     if bpy.app.background or not hits.found:
         return
@@ -133,17 +156,23 @@ def paint(hits: BeyondMocapHits) -> None:
 
 
 def picture(found: dict) -> np.ndarray:
-    """The picture (SIZE, SIZE, 4) float32, its lowest row first, of what `summary` says.
+    """Build the picture of an analysis.
 
-    Above the height of the part, below its speed. Thin red lines stand where it is highest, magenta ones where it is
-    fastest, as in the paper; at the foot red bars are the stretches in which a ball can be hit, blue ones the hit
-    motions."""
+    The upper curve is the part's height, the lower one its speed. Thin red lines mark the high frames, magenta ones the
+    fast frames, as in the paper; at the bottom red bars are ball stretches, blue bars hit motions.
+
+    Args:
+        found: as `summarize_hits` builds it.
+    Returns:
+        (SIZE, SIZE, 4) float32, lowest row first.
+    """
     image = np.empty((SIZE, SIZE, 4), np.float32)
     image[..., :3], image[..., 3] = _GROUND, 1.0
     count, middle = max(found["count"] - 1, 1), _BARS + (SIZE - _BARS) // 2
     panes = ((middle + _EDGE, SIZE - _EDGE), (_BARS + _EDGE, middle - _EDGE))
 
     def column(frame: float) -> int:
+        """Column of the picture for a frame."""
         return int(round(_EDGE + frame / count * (SIZE - 1 - 2 * _EDGE)))
 
     for second in np.arange(0.0, found["count"], found["fps"]):
@@ -169,20 +198,22 @@ def picture(found: dict) -> np.ndarray:
 
 
 def forget_pictures() -> None:
-    """Take all pictures away."""
+    """Remove all pictures."""
     for kept in pictures.values():
         bpy.utils.previews.remove(kept)
     pictures.clear()
 
 
 def _draw_curve(image: np.ndarray, heights: np.ndarray, colour) -> None:
-    """A curve two pixels wide through heights (N,) px, spread over the picture's width."""
+    """Draw a curve two pixels wide through heights (N,) px, spread over the picture's width."""
     columns = np.arange(_EDGE, SIZE - _EDGE)
     line = np.interp(columns, np.linspace(_EDGE, SIZE - 1 - _EDGE, len(heights)), heights)
+    # each column covers the curve from half-way to its left neighbour to half-way to its right one
     before, after = np.r_[line[:1], line[:-1]], np.r_[line[1:], line[-1:]]
     low = np.minimum(line, np.minimum(0.5 * (line + before), 0.5 * (line + after))) - 1.0
     high = np.maximum(line, np.maximum(0.5 * (line + before), 0.5 * (line + after))) + 1.0
     rows = np.arange(SIZE)[:, None]
+    # share of each pixel that the curve covers, for antialiasing
     cover = np.clip(np.minimum(rows + 0.5 - low, high - rows + 0.5), 0.0, 1.0)[..., None]
     image[:, _EDGE : SIZE - _EDGE, :3] += cover * (np.array(colour) - image[:, _EDGE : SIZE - _EDGE, :3])
 

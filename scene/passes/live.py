@@ -1,9 +1,9 @@
-"""Sees that a passing scene has been edited, waits until the hand has come to rest, and has it made again. While a
-place is being dragged, its flights alone are worked out, again and again, and drawn.
+"""Live updates of a passing scene: an edit is noticed, and when the user pauses, the scene is synthesized again.
 
-Only where the scene is shown already. What is asked is compared with what the scene shown was made of, so that neither
-its own making nor a walk along the timeline starts anything. The same wish is begun once: what was cancelled, undone or
-cannot be made waits for the next edit.
+While a place is dragged, only its flights are planned, again and again, and drawn. Nothing happens unless the scene has
+been synthesized before. The requested scene is compared with the one that is shown, so that neither its own update nor
+a change of frame starts anything. Each request starts once: one that was cancelled, undone or failed waits for the next
+edit.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _running: list[background.Job] = []  # at most one
 
 
 def edited(scene: bpy.types.Scene) -> str:
-    """Digest of what is asked for, where it is another than what is shown was made of; else empty."""
+    """Compute the digest of the requested scene if it differs from the scene that is shown, otherwise ""."""
     settings = scene.beyond_mocap_passes
     if not settings.live or settings.made_of in ("", PLAYED):
         return ""
@@ -37,20 +37,21 @@ def edited(scene: bpy.types.Scene) -> str:
 
 
 def look_at(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    """Note whether the scene shown may be another than is asked for."""
+    """Mark the scene as possibly edited."""
     settings = scene.beyond_mocap_passes
     if settings.live and settings.made_of and any(isinstance(one.id, bpy.types.Object) for one in depsgraph.updates):
         WATCHER.mark()
 
 
 def settle(scene: bpy.types.Scene) -> bool:
-    """Have the scene made again where it has been edited; whether that has to wait."""
+    """Start an update if the scene was edited; return whether that has to wait."""
     if _busy():
         return True
     _rest()
     digest = edited(scene)
     if not digest:
         make.show_dragged(None)
+    # each request starts once, also if it fails or is cancelled
     if digest and digest != _seen["begun"]:
         _seen["begun"] = digest
         if bpy.ops.beyond_mocap.passes_make.poll():
@@ -63,13 +64,14 @@ def _busy() -> bool:
 
 
 def _drag(scene) -> None:
-    """Take in the flights that have been worked out, and begin with those of where everybody is now."""
+    """Draw the flights that are planned, and start to plan those of the current places."""
     if _busy():
         return
     if _running:
         if not _running[0].poll():
             return
         job = _running.pop()
+        # None: the job was cancelled or failed
         if job.result is not None:
             make.show_dragged(job.result)
             window.redraw()
@@ -78,7 +80,7 @@ def _drag(scene) -> None:
         return
     try:
         order = make.order_of(scene)
-    except BeyondMocapError:  # where he is just now nobody can be
+    except BeyondMocapError:  # the player is at an impossible place just now
         return
     if order.library is not None and order.digest != _seen["drawn"]:
         _seen["drawn"] = order.digest
@@ -86,14 +88,14 @@ def _drag(scene) -> None:
 
 
 def _rest() -> None:
-    """The hand rests: nothing is worked out for the drag alone any more."""
+    """Stop planning flights for a drag."""
     if _running:
         _running.pop().cancel()
     _seen["drawn"] = ""
 
 
 def forget() -> None:
-    """Nothing is worked out or drawn any more."""
+    """Stop updates and remove what is drawn."""
     _seen["begun"] = ""
     _rest()
     make.forget_rallies()

@@ -1,5 +1,7 @@
-"""A passing scene is made: written down on the main thread, worked out in any thread, laid on bodies and a ball. The
-overlays draw its flights: those that are shown, and while a place is dragged, those of where it is just now."""
+"""Generation of a passing scene: ordered on the main thread, computed in any thread, applied to characters and a ball.
+
+The overlays draw its flights: those of the scene that is shown, and those of the current places while one is dragged.
+"""
 
 from __future__ import annotations
 
@@ -34,19 +36,28 @@ if TYPE_CHECKING:
     from ...beyond_mocap.passes.passes import Passes
 
 BALL, NET = "Passing Ball", "Net"
-MESH = 0.1  # metres between two threads of the net
-MOST_LINES = 12
-WAY_STEP = 0.03  # s between two points of a way
-MOST_WAYS, MOST_RALLIES = 40, 20  # candidates of a strike, and scenes, that are kept
+MESH = 0.1  # m between two threads of the net
+MOST_LINES = 12  # of messages in the panel
+WAY_STEP = 0.03  # s between two points of a trajectory
+MOST_WAYS, MOST_RALLIES = 40, 20  # candidates of a strike, and scenes, that are stored
 
-_rallies: dict[str, "Rally"] = {}  # by the digest of what they were made of
+_rallies: dict[str, "Rally"] = {}  # by the digest of their order
 _dragged: list["Rally"] = []
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to be made. scene, and the scene frame of its second 0; the library, or where it is and how it is built;
-    digest of all that."""
+    """Order for a passing scene.
+
+    Attributes:
+        scene: the passing scene.
+        start: scene frame of its second 0.
+        folder: folder of the library.
+        unit: metres per unit of the library's clips; None: guessed.
+        library: the library if it is loaded.
+        digest: of all that.
+        build: further arguments of `build`.
+    """
 
     scene: PassScene
     start: float
@@ -59,9 +70,17 @@ class Order:
 
 @dataclass(frozen=True, eq=False)
 class Rally:
-    """Plain numbers, metres in the world. start: scene frame of second 0; starts (K,) s and ways, (n, 3) m each, of the
-    flights; strikes (S, 3) m and strike_times (S,) s; bounces (B, 3) m; candidates: (M, T, 3) m for each strike, from
-    which its way was chosen, empty for the last one."""
+    """Trajectories to draw, metres in the world frame.
+
+    Attributes:
+        start: scene frame of second 0.
+        starts: (K,) s of the flights.
+        flight_paths: (n, 3) m for each flight.
+        strike_times: (S,) s.
+        strikes: (S, 3) m.
+        bounces: (B, 3) m.
+        candidates: (M, T, 3) m for each strike, trajectories from which its own was chosen; empty for the last one.
+    """
 
     start: float
     starts: np.ndarray
@@ -72,13 +91,13 @@ class Rally:
     candidates: tuple[np.ndarray, ...]
 
     def flight_at(self, seconds: float) -> int:
-        """The number of the flight in which the ball is."""
+        """Find the index of the flight in which the ball is."""
         return int(np.clip(np.searchsorted(self.starts, seconds + 1e-9, side="right") - 1, 0, len(self.ways) - 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What came of an order; rally: what is drawn of it."""
+    """Result of an order; `rally` is what is drawn of it."""
 
     order: Order
     library: "Library"
@@ -87,7 +106,11 @@ class Result:
 
 
 def order_of(scene: bpy.types.Scene) -> Order:
-    """What the settings ask for; InputError where that makes no sense, or where a body cannot be animated."""
+    """Build the order from the settings.
+
+    Raises:
+        InputError: if the settings are invalid or a character cannot be animated.
+    """
     settings, common = scene.beyond_mocap_passes, scene.beyond_mocap
     wanted = asked.scene_of(scene)
     chosen = settings.library_folder or common.library_folder
@@ -107,14 +130,14 @@ def order_of(scene: bpy.types.Scene) -> Order:
         channels.check_free(settings.rally)
         possession.check_unaimed(settings.rally)
     unit = (common.library_unit or None) if not settings.library_folder else None
-    # without the library's folder: a file may be moved with it
+    # the folder as set: a file may be moved with its library
     digest = byte_digest(repr((wanted, chosen, unit, settings.start_frame))).hex()
     return Order(wanted, float(settings.start_frame), folder, unit=unit, library=session.library(folder, unit),
                  digest=digest, build=preferences.for_build(folder))
 
 
 def work(order: Order, progress, cancelled, _hurry) -> Result:
-    """Build the library where it is not there yet, and play the scene. Never touches bpy."""
+    """Build the library if it is not loaded, and synthesize the scene. Does not use bpy."""
     from ...beyond_mocap.library.build import build
     from ...beyond_mocap.passes.passes import passes
 
@@ -126,7 +149,7 @@ def work(order: Order, progress, cancelled, _hurry) -> Result:
 
 
 def flights(order: Order, cancelled) -> Rally:
-    """What is drawn of a scene while it is dragged: its flights alone, without bodies. Never touches bpy."""
+    """Plan the flights of a scene alone, while it is dragged. Does not use bpy."""
     from ...beyond_mocap.passes.passes import ball_of, planned
 
     plan = planned(order.library, order.scene, None, cancelled)
@@ -134,7 +157,7 @@ def flights(order: Order, cancelled) -> Rally:
 
 
 def show(scene: bpy.types.Scene, result: Result) -> None:
-    """Lay the scene on its bodies and its ball, which are made where there are none."""
+    """Apply the scene to its characters and its ball, which are created if there are none."""
     settings, made = scene.beyond_mocap_passes, result.passes
     session.keep_library(result.library, result.order.unit)
     rows = {row.name: row for row in settings.players}
@@ -154,7 +177,7 @@ def show(scene: bpy.types.Scene, result: Result) -> None:
 
 
 def clear(scene: bpy.types.Scene) -> None:
-    """Take away what was made for the scene; bodies of the user's play their own motion again. The lists stay."""
+    """Remove what was created for the scene; the user's own characters play their own motion again. The lists stay."""
     settings = scene.beyond_mocap_passes
     shown.check(*settings.players)
     if settings.rally is not None:
@@ -174,7 +197,7 @@ def clear(scene: bpy.types.Scene) -> None:
 
 
 def strike_lines(scene: bpy.types.Scene, made: "Passes", start: float) -> list[str]:
-    """A line for each strike: its scene frame, a tab, what is done."""
+    """Describe each strike in a line: its scene frame, a tab, and what happens."""
     found = []
     for number, one in enumerate(made.plan.strikes):
         frame = round(start + one.order.time * frames_per_second(scene))
@@ -186,18 +209,24 @@ def strike_lines(scene: bpy.types.Scene, made: "Passes", start: float) -> list[s
 
 
 def figures(made: "Passes") -> list[str]:
-    """Lines "name: value" about the scene."""
+    """List lines "name: value" about the scene."""
     gaps = [gap for one in made.players for gap in one.gaps if not np.isnan(gap)]
     speeds = [float(np.linalg.norm(one.velocity_out)) for one in made.plan.strikes]
     return [f"Strikes: {len(made.plan.strikes)}", f"Length: {made.plan.seconds:.1f} s",
-            f"Off the ball: {1000 * max(gaps, default=0.0):.1f} mm",
+            f"Contact gap: {1000 * max(gaps, default=0.0):.1f} mm",
             f"Fastest ball: {max(speeds, default=0.0):.1f} m/s",
             f"Flights: {sum(one.travel for one in made.plan.strikes):.1f} s"]
 
 
 def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float) -> None:
-    """One player's motion on his body, which is made, dressed or made anew where it does not fit. take: whatever has a
-    `motion` and a `start_time` (s); start: the scene frame of second 0."""
+    """Apply one player's motion to their character, which is created or replaced if it does not fit.
+
+    Args:
+        scene: the scene.
+        row: the player.
+        take: anything with a `motion` and a `start_time` (s).
+        start: scene frame of second 0.
+    """
     room = bake.collection(scene)
     if row.shown is not None and row.shown != row.body:
         shown.let_go(row)
@@ -220,7 +249,13 @@ def lay_body(scene: bpy.types.Scene, row: BeyondMocapPasser, take, start: float)
 
 
 def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
-    """The ball's way on the ball, which is made where there is none. made: whatever has a `ball` and its `kind`."""
+    """Apply the ball's path to the ball, which is created if there is none.
+
+    Args:
+        scene: the scene.
+        played_scene: anything with a `ball` and its `kind`.
+        start: scene frame of second 0.
+    """
     settings, path = scene.beyond_mocap_passes, made.ball
     target = settings.rally
     if target is None or target.name not in scene.objects:
@@ -232,6 +267,7 @@ def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
         put_aside(settings.ball_before, target)
 
     def write() -> None:
+        """Write the path to the ball's action."""
         channels.discard(target, KEPT)
         first = start + float(path.times[0]) * frames_per_second(scene)
         ball.write(target, path, scene, first)[KEPT] = True
@@ -240,7 +276,7 @@ def lay_ball(scene: bpy.types.Scene, made: "Passes", start: float) -> None:
 
 
 def _tool(scene, target: bpy.types.Object, orders) -> None:
-    """What a player strikes with in his hand, where he strikes with anything."""
+    """Put the tool of a player's strikes in their hand, or remove it."""
     striking = next((order for order in orders if order.part == "tool"), None)
     if striking is None:
         shown.remove_tool(target)
@@ -249,7 +285,7 @@ def _tool(scene, target: bpy.types.Object, orders) -> None:
 
 
 def _net(scene, net: Net | None) -> None:
-    """The net, of threads; none where none is wanted."""
+    """Create, update or remove the net."""
     found = _own_net(scene)
     if net is None:
         if found is not None:
@@ -278,11 +314,12 @@ def _net(scene, net: Net | None) -> None:
 
 
 def _own_net(scene) -> bpy.types.Object | None:
-    return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # under any name
+    """Find the net that this extension created."""
+    return next((thing for thing in bake.collection(scene).objects if thing.get(KEPT) == NET), None)  # any name
 
 
 def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
-    """What is drawn of a plan."""
+    """Build the trajectories of a plan."""
     ends = [*(flight.launch.time for flight in plan.flights[1:]), plan.seconds]
     ways, met = [], []
     for flight, end in zip(plan.flights, ends):
@@ -298,7 +335,10 @@ def rally_of_plan(plan: "PassPlan", ball: "Ball", start: float) -> Rally:
 
 
 def _candidates(strike, ball: "Ball") -> np.ndarray:
-    """Ways (M, T, 3) that the ball could have taken from a strike (Fig. 6, black)."""
+    """Compute the trajectories (M, T, 3) m that the ball could have taken from a strike (Fig. 6, black).
+
+    M is MOST_CANDIDATES at most.
+    """
     from ...beyond_mocap.ball.batch import courses
 
     natural = strike.natural
@@ -310,7 +350,7 @@ def _candidates(strike, ball: "Ball") -> np.ndarray:
 
 
 def keep_rally(digest: str, rally: Rally) -> None:
-    """Keep what was made of `digest`, so that undo and redo find it."""
+    """Store the trajectories of an order's `digest`, so that undo and redo find them."""
     _dragged.clear()
     _rallies.pop(digest, None)
     _rallies[digest] = rally
@@ -319,17 +359,17 @@ def keep_rally(digest: str, rally: Rally) -> None:
 
 
 def show_dragged(rally: Rally | None) -> None:
-    """Draw this one while a place is dragged; None: no more."""
+    """Draw these trajectories while a place is dragged; None: stop."""
     _dragged[:] = [rally] if rally is not None else []
 
 
 def has_rallies() -> bool:
-    """Whether there is anything to draw; quick, since it is asked at every redraw."""
+    """Whether there is anything to draw; fast, because every redraw asks."""
     return bool(_rallies or _dragged)
 
 
 def rally_of(scene: bpy.types.Scene) -> Rally | None:
-    """The rally of a scene; None where this session has not made it."""
+    """Find the trajectories of a scene; None if this session has not generated it."""
     made_of = scene.beyond_mocap_passes.made_of
     if not made_of:
         return None
@@ -337,6 +377,6 @@ def rally_of(scene: bpy.types.Scene) -> Rally | None:
 
 
 def forget_rallies() -> None:
-    """Nothing is remembered any more."""
+    """Clear all trajectories."""
     _rallies.clear()
     _dragged.clear()

@@ -1,5 +1,7 @@
-"""The settings as a passing scene of the core, and back: what the panel shows is what a SCENE.json says. A pass may be
-struck as an armature's action shows it (eq. 2)."""
+"""The lists of the panel as a passing scene of the core, and back: the panel shows what a SCENE.json holds.
+
+The strike of a pass can be taken from an armature's action (eq. 2).
+"""
 
 from __future__ import annotations
 
@@ -22,17 +24,21 @@ from .settings import KEPT, BeyondMocapPass, BeyondMocapPasser, BeyondMocapPasse
 if TYPE_CHECKING:
     from ...beyond_mocap.passes.hits import HitMotion
 
-SIZE = 0.5  # metres
+SIZE = 0.5  # m, of the Empties that mark places
 SHIRTS = ((0.75, 0.05, 0.06), (0.04, 0.14, 0.70), (0.80, 0.55, 0.04), (0.04, 0.45, 0.20), (0.45, 0.08, 0.55),
           (0.02, 0.45, 0.60))
 NUMBERS = ("radius", "restitution", "linear_drag", "drag", "gravity")
-_DIGITS = 6  # of numbers of single precision
+_DIGITS = 6  # decimals of single-precision numbers
 _MOST_KEPT = 32
-_examples: dict[tuple, "HitMotion"] = {}  # by all that it was read from; asked for again and again during a drag
+_examples: dict[tuple, "HitMotion"] = {}  # by all that they were read from; a drag asks again and again
 
 
 def scene_of(scene: bpy.types.Scene) -> PassScene:
-    """The passing scene that the settings ask for; InputError where it makes no sense."""
+    """Build the passing scene that the settings describe.
+
+    Raises:
+        InputError: if the settings are invalid.
+    """
     settings = scene.beyond_mocap_passes
     return PassScene(
         tuple(_player(scene, one) for one in settings.players),
@@ -47,7 +53,7 @@ def scene_of(scene: bpy.types.Scene) -> PassScene:
 
 
 def fill(context: bpy.types.Context, wanted: PassScene) -> None:
-    """Let the settings say what a passing scene asks for; places become Empties, those of before go."""
+    """Set the settings from a passing scene; places become Empties, and those of the scene before are removed."""
     settings = context.scene.beyond_mocap_passes
     live, settings.live = settings.live, False
     shown.check(*settings.players)
@@ -63,7 +69,7 @@ def fill(context: bpy.types.Context, wanted: PassScene) -> None:
 
 
 def _fill_players(context: bpy.types.Context, wanted: PassScene) -> None:
-    """Rows for the wanted players, in their order; who is in the list already keeps his body."""
+    """Set the rows of the players, in their order; players who are in the list already keep their character."""
     rows, names = context.scene.beyond_mocap_passes.players, {player.name for player in wanted.players}
     for number in reversed(range(len(rows))):
         remove_place(rows[number])
@@ -84,7 +90,16 @@ def _fill_players(context: bpy.types.Context, wanted: PassScene) -> None:
 def add_player(
     context: bpy.types.Context, name: str, place: tuple[float, float], facing: float = 0.0
 ) -> BeyondMocapPasser:
-    """One more player who stands at `place` (x, y) m and looks along `facing`, radians; his Empty too."""
+    """Add a player with an Empty.
+
+    Args:
+        context: the context.
+        name: the player's name.
+        place: (x, y) m.
+        facing: heading, rad.
+    Returns:
+        The player's row.
+    """
     settings = context.scene.beyond_mocap_passes
     row = settings.players.add()
     row.shirt = SHIRTS[(len(settings.players) - 1) % len(SHIRTS)]
@@ -95,26 +110,26 @@ def add_player(
 
 
 def free_name(settings: BeyondMocapPasses) -> str:
-    """A name that no player of the list has."""
+    """Find a name that no player of the list has."""
     taken = {row.name for row in settings.players}
     usual = ("Ann", "Ben", "Cho", "Dia", "Eli", "Fay", "Gus", "Hal")
     return next(name for name in (*usual, *(f"Player {n}" for n in range(9, 999))) if name not in taken)
 
 
 def remove_place(row: BeyondMocapPasser) -> None:
-    """Take a player's Empty out of the file, where it was made here and nothing hangs on it."""
+    """Remove a player's Empty from the file, if this extension created it and nothing is parented to it."""
     place, row.place = row.place, None
     remove_mark(place)
 
 
 def remove_mark(thing: bpy.types.Object | None) -> None:
-    """Take an Empty of ours out of the file, unless something hangs on it."""
+    """Remove an Empty that this extension created from the file, unless something is parented to it."""
     if thing is not None and thing.get(KEPT) and thing.type == "EMPTY" and not thing.children and thing.library is None:
         bpy.data.objects.remove(thing)
 
 
 def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float, float], float]:
-    """Where an object is on the ground, m, and which way its X looks, radians."""
+    """Measure where an object is on the ground, (2,) m, and the direction of its X axis, rad."""
     matrix = np.array(thing.matrix_world, float)
     place = matrix[:2, 3] / units_per_metre(scene)
     facing = math.atan2(matrix[1, 0], matrix[0, 0])
@@ -122,9 +137,10 @@ def stands(scene: bpy.types.Scene, thing: bpy.types.Object) -> tuple[tuple[float
 
 
 def _player(scene, row: BeyondMocapPasser) -> Player:
+    """Build a player from a row."""
     if row.place is None or row.place.name not in scene.objects:
-        raise InputError(f"player {row.name}", "nothing that says where he stands", "an object",
-                         "choose one as his Place")
+        raise InputError(f"player {row.name}", "no place", "an object that marks where the player stands",
+                         "choose one as Place")
     place, facing = stands(scene, row.place)
     tool = _tool(row) if row.part == "tool" else None
     side = "" if row.side == "either" else row.side
@@ -136,7 +152,7 @@ def _tool(row: BeyondMocapPasser) -> Tool:
 
 
 def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
-    """What the strike is to be like: an armature's, or that of a recording of the library."""
+    """Build the example of a strike: an armature's motion, or a recording of the library."""
     giver = next((one for one in scene.beyond_mocap_passes.players if one.name == row.who), None)
     if wants_example(row) and giver is not None:
         own = (giver.bone or giver.part, giver.side)
@@ -147,6 +163,7 @@ def _example(scene, row: BeyondMocapPass, number: int) -> Example | None:
 
 
 def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
+    """Build a pass from a row."""
     at = stands(scene, row.at)[0] if row.at is not None and row.at.name in scene.objects else None
     side = {"own": None, "either": ""}.get(row.side, row.side)
     return Pass(row.who, row.to, row.kind, bounces=row.bounces, part=None if row.part == "own" else row.part, side=side,
@@ -155,30 +172,37 @@ def _pass(scene, row: BeyondMocapPass, number: int) -> Pass:
 
 
 def _rate(scene) -> float:
-    """Frames per second: as set, or the scene's own, so that strikes fall on its frames."""
+    """Compute the frame rate: as set, or the scene's own, so that strikes fall on its frames."""
     low, high = LIMITS["fps"]
     return _exact(scene.beyond_mocap_passes.rate) or min(max(frames_per_second(scene), low), high)
 
 
 def _serve(settings):
+    """Build the serve from the settings."""
     place = tuple(_exact(value) for value in settings.serve_at)
     return {"USUAL": None, "GROUND": GROUND, "PLAYER": settings.serve, "PLACE": place}[settings.serve_from]
 
 
 def _weights(row) -> Weights:
+    """Parse the weights of the panel, with those of single bones.
+
+    Raises:
+        InputError: if the bone weights cannot be read.
+    """
     bones = {}
     for item in filter(str.strip, row.bones.replace("=", " ").split(",")):
         name, _, number = item.strip().rpartition(" ")
         try:
             bones[name.strip()] = float(number)
         except ValueError:
-            raise InputError("weights of bones", item.strip(),
-                             "bones with a number each, such as left foot 2, head 0.5") from None
+            raise InputError("bone weights", item.strip(),
+                             "bones with one number each, such as left foot 2, head 0.5") from None
     return Weights(*(_exact(getattr(row, name)) for name in ("speed", "vectors", "times", "position", "velocity")),
                    bones)
 
 
 def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
+    """Set a row from a player; a part that is no known one is a joint's name."""
     known = {"foot", "head", "chest", "hand", "tool"}
     row.part, row.bone = (player.part, "") if player.part in known else ("foot", player.part)
     row.side, row.height = player.side or "either", player.height
@@ -187,6 +211,7 @@ def _fill_player(row: BeyondMocapPasser, player: Player) -> None:
 
 
 def _fill_pass(context, row, one: Pass) -> None:
+    """Set a row from a pass."""
     row.who, row.to, row.kind = one.giver, one.receiver, one.kind
     row.bounces, row.error = one.bounces, one.error or "none"
     row.part, row.seconds = one.part or "own", one.seconds or 0.0
@@ -198,6 +223,7 @@ def _fill_pass(context, row, one: Pass) -> None:
 
 
 def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
+    """Set ball, net, serve and numbers of the settings from a passing scene."""
     settings.ball, settings.own = wanted.ball.kind, bool(wanted.ball.changes)
     for name, value in wanted.ball.changes.items():
         if name in NUMBERS:
@@ -223,6 +249,7 @@ def _fill_scene(settings: BeyondMocapPasses, wanted: PassScene) -> None:
 
 
 def _empty(context, name: str, place, facing: float, colour) -> bpy.types.Object:
+    """Create an Empty that marks a place (m) and heading (rad)."""
     units = units_per_metre(context.scene)
     thing = bpy.data.objects.new(name, None)
     thing.empty_display_type, thing.empty_display_size, thing.show_name = "ARROWS", SIZE * units, True
@@ -239,31 +266,40 @@ def _place(values) -> tuple[float, float]:
 
 
 def _exact(value: float) -> float:
-    """A number of single precision as it was typed."""
+    """Round a single-precision number to the value that was typed."""
     return round(float(value), _DIGITS)
 
 
 def wants_example(row: BeyondMocapPass) -> bool:
-    """Whether an armature shows how the pass is struck; also where that armature is gone."""
+    """Whether an armature shows how the pass is struck, also if that armature no longer exists."""
     return row.actor is not None or bool(row.actor_known)
 
 
 def hit_of(
     scene: bpy.types.Scene, row: BeyondMocapPass, number: int, part: str, side: str, tool: Tool | None
 ) -> "HitMotion":
-    """The strongest strike by `part` in the stretch that a pass names of its armature's motion.
+    """Find the strongest strike by `part` in the stretch of an armature's motion that a pass names.
 
-    number: of the pass, from 1, for errors. part, side ("": the stronger one), tool: of who strikes. InputError: the
-    armature is gone, is one of the scene's own bodies, does not move, or does not strike there."""
+    Args:
+        scene: the scene.
+        row: the pass.
+        number: number of the pass, from 1, for errors.
+        part: the part of the player who strikes.
+        side: its side; "": the faster one.
+        tool: the tool of the player who strikes.
+    Raises:
+        InputError: if the armature no longer exists, is one of the scene's own characters, does not move, or does not
+        strike there.
+    """
     body, where = row.actor, f"pass {number}: Like Armature"
     if body is None or body.name not in scene.objects:
-        raise InputError(where, f"{row.actor_known or body.name} is not in the scene any more",
-                         "an armature that strikes", "choose another one, or empty the field")
+        raise InputError(where, f"{row.actor_known or body.name} is no longer in the scene",
+                         "an armature that strikes", "choose another one, or clear the field")
     if any(body in (player.body, player.shown) for player in scene.beyond_mocap_passes.players):
         raise InputError(where, f"{body.name}, which plays this scene itself", "another armature",
-                         "duplicate it before")
+                         "duplicate it first")
     if row.actor_cut and row.actor_last <= row.actor_first:
-        raise InputError(where, f"frames {row.actor_first} to {row.actor_last}", "the later frame last")
+        raise InputError(where, f"frames {row.actor_first} to {row.actor_last}", "a later frame as To Frame")
     carrier, action = carrier_of(body), body.animation_data and body.animation_data.action
     key = (body.session_uid, carrier.stamp(scene), carrier.keys_digest(), action and str(action.get(MARK)),
            row.actor_cut and (row.actor_first, row.actor_last), part, side, tool)
@@ -279,20 +315,23 @@ def hit_of(
 
 
 def list_lost_examples(settings: BeyondMocapPasses) -> str:
-    """A line about examples that a SCENE.json cannot hold, which names recordings of a library only; "" without any."""
+    """Describe the examples that a SCENE.json cannot hold, because it names recordings of a library only; "" if there
+    are none.
+    """
     numbers = [str(number) for number, row in enumerate(settings.passes, start=1) if wants_example(row)]
     if not numbers:
         return ""
     passes = f"{'passes' if len(numbers) > 1 else 'pass'} {', '.join(numbers)}"
-    return f"without the example of {passes}, an armature: a file can name recordings of the library only"
+    return f"without the armature of {passes}: a file can name recordings of the library only"
 
 
 def forget_examples() -> None:
-    """Read armatures anew: what constraints of one follow may have changed unseen."""
+    """Clear the examples, so that armatures are read again: what constraints follow may have changed unnoticed."""
     _examples.clear()
 
 
 def _strike_shown(scene, row: BeyondMocapPass, part: str, side: str, tool: Tool | None) -> "HitMotion":
+    """Find the strongest strike that an armature shows in the stretch of a pass."""
     from ...beyond_mocap.passes.hits import strongest
 
     body = row.actor
@@ -306,5 +345,5 @@ def _strike_shown(scene, row: BeyondMocapPass, part: str, side: str, tool: Tool 
     hit = strongest(stretch, part, side, tool)
     if hit is None:
         raise InputError(f"armature {body.name}", f"no strike by {' '.join(filter(None, (side, part)))} on {span}",
-                         "a stretch with a whole strike", "see Hit Analysis for what it has")
+                         "a stretch with a whole strike", "open Hit Analysis to see its strikes")
     return hit

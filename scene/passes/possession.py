@@ -1,11 +1,12 @@
-"""Possession: a bone carries the ball for a while, by a Child Of constraint whose influence is keyed.
+"""Possession: a bone carries the ball for some frames, by a Child Of constraint whose influence is keyed.
 
-The ball's own action is put aside; it plays one that is made of it and of all stretches in which it is carried, so that
-any of them can be changed or taken back. Where a stretch begins, the ball is where it was. Where it ends, the ball is
-on its own way again, if that goes on, else it stays where it was let go. In between it is rigid with the bone, but for
-the frames at either end in which it comes to where it is carried and back.
+The ball's own action is set aside; it plays one that is built from it and from all stretches in which it is carried, so
+that each of them can be changed or removed. Where a stretch begins, the ball is where it was. Where it ends, the ball
+is
+on its own path again if that continues, otherwise it stays where it was released. Between, it is rigid with the bone,
+except for the frames at either end in which it moves to its carried position and back.
 
-With T the bone's matrix in the world, W the ball's own way and L = T^-1 W the ball as the bone sees it, the constraint
+With T the bone's matrix in the world, W the ball's own path and L = T^-1 W the ball in the bone's frame, the constraint
 shows T inv own. Its inverse is that of T on the first frame, so own = T(first) L there, which is W: no jump.
 """
 
@@ -28,14 +29,18 @@ from ..result.result import BeyondMocapBefore
 from ..rigs import armature
 from .settings import KEPT, BeyondMocapHold
 
-CONSTANT = 0  # Keyframe.interpolation as foreach_set takes it
-FASTEST = 8.0  # m/s at which a ball comes to where it is carried; from afar it takes longer than it is set to
-JUST_BEFORE = 0.02  # frames; Blender takes keys within 0.01 for one
-SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # metres from a bone to the skin over it
+CONSTANT = 0  # value of Keyframe.interpolation for foreach_set
+FASTEST = 8.0  # m/s with which a ball moves to its carried position; over a long distance it takes longer than set
+JUST_BEFORE = 0.02  # frames; Blender merges keys within 0.01
+SURFACE = {"hand": 0.03, "foot": 0.045, "head": 0.1, "chest": 0.12}  # m from a bone to the skin over it
 
 
 def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str) -> str:
-    """The bone of a part; InputError where the skeleton lacks it."""
+    """Find the bone of a part.
+
+    Raises:
+        InputError: if the skeleton lacks it.
+    """
     skeleton = armature.skeleton_of(body, scene)
     found = identify(skeleton)
     limb = getattr(found, side)
@@ -43,8 +48,8 @@ def bone_of(scene: bpy.types.Scene, body: bpy.types.Object, part: str, side: str
         "foot": limb.toe_or_foot, "hand": limb.hand, "tool": limb.hand, "head": found.head, "chest": found.chest,
     }[part]  # fmt: skip
     if joint is None:
-        raise InputError(f"armature {body.name}", f"no bone for {part}", "a humanoid",
-                         "choose another part, or name the bone")
+        raise InputError(f"armature {body.name}", f"no bone for the {part}", "a humanoid skeleton",
+                         "choose another part, or enter the bone's name")
     return skeleton.names[joint]
 
 
@@ -52,14 +57,28 @@ def take(
     scene: bpy.types.Scene, ball: bpy.types.Object, body: bpy.types.Object, bone: str, first: int, last: int,
     how: str = "KEEP", settle: int = 4, skin: float = 0.03,
 ) -> BeyondMocapHold:
-    """Let a bone carry the ball from frame `first` until it is let go on `last`; how: one of `setting.HOLDS`; settle:
-    frames within which it comes to where it is carried; skin: metres from the bone to what touches. InputError, and
-    nothing changed, where it cannot be carried."""
+    """Attach the ball to a bone.
+
+    Args:
+        scene: the scene.
+        ball: the ball.
+        body: the armature.
+        bone: the bone that carries the ball.
+        first: first frame on which it is carried.
+        last: frame on which it is released.
+        mode: one of `setting.HOLDS`.
+        settle: frames in which it moves to its carried position.
+        skin: m from the bone to the surface that touches the ball.
+    Returns:
+        The new stretch.
+    Raises:
+        InputError: if the ball cannot be carried; nothing is changed then.
+    """
     _check(ball, body, bone, first, last)
     for other in ball.beyond_mocap_ball.holds:
         if first < other.last and other.first < last:
             raise InputError(f"ball {ball.name}",
-                             f"carried by {holder_name(other)} on frames {other.first} to {other.last} already",
+                             f"already carried by {holder_name(other)} on frames {other.first} to {other.last}",
                              "other frames", "free the ball there first")
     if not ball.beyond_mocap_ball.before.kept:
         put_aside(ball.beyond_mocap_ball.before, ball)
@@ -77,7 +96,7 @@ def take(
 
 
 def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = None) -> None:
-    """Take back one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
+    """Remove one stretch in which the ball is carried, or all; after the last one it plays its own action again."""
     channels.check_local(ball)
     channels.check_free(ball)
     check_unaimed(ball)
@@ -94,8 +113,10 @@ def free(scene: bpy.types.Scene, ball: bpy.types.Object, number: int | None = No
 
 
 def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
-    """Make the ball's action anew, of its own way and of who carries it. Stretches whose armature, bone or constraint
-    is gone count no more; one at least is left."""
+    """Build the ball's action from its own path and all stretches in which it is carried.
+
+    Stretches whose armature, bone or constraint no longer exists are ignored; at least one is left.
+    """
     holds = sorted((hold for hold in ball.beyond_mocap_ball.holds if _holds(ball, hold)), key=lambda hold: hold.first)
     frames, way, ends = own_way(scene, ball, holds)
     own, lets_go = list(way), []
@@ -104,23 +125,25 @@ def rebuild(scene: bpy.types.Scene, ball: bpy.types.Object) -> None:
         bones = _bones(scene, hold)
         seen = _carried(scene, hold, bones, start=own[a],
                         end=own[b] if ends is not None and ends[1] > hold.last else None, ball=ball)
+        # the constraint's inverse is that of the bone on the first frame, so there is no jump there
         inverse = bones[0]
         ball.constraints[hold.name].inverse_matrix = inverse.inverted()
         lets_go.append((hold, inverse @ seen[-1]))
-        if ends is None or ends[1] <= hold.last:  # it stays where it was let go
+        # no path of its own after this stretch
+        if ends is None or ends[1] <= hold.last:  # it stays where it was released
             own[b:] = [bones[-1] @ seen[-1]] * (len(own) - b)
         own[a:b] = [inverse @ place for place in seen[:-1]]
     _write(ball, frames, own, lets_go)
 
 
 def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
-    """Let `write()` give the ball another action of its own; who carries it carries it on its new way."""
+    """Replace the ball's own action by calling `write()`; stretches in which it is carried apply to its new path."""
     own, name = ball.beyond_mocap_ball, ball.name
     carried = any(_holds(ball, hold) for hold in own.holds)
     if own.before.kept:
         bring_back(own.before, ball, KEPT)
     write()
-    if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have come here itself
+    if carried and bpy.data.objects.get(name) == ball and not own.before.kept:  # `write` may have called this
         put_aside(own.before, ball)
         rebuild(scene, ball)
 
@@ -128,7 +151,13 @@ def anew(scene: bpy.types.Scene, ball: bpy.types.Object, write) -> None:
 def own_way(
     scene: bpy.types.Scene, ball: bpy.types.Object, holds
 ) -> tuple[np.ndarray, list[Matrix], tuple[int, int] | None]:
-    """Frames (F,), the ball's own place on each, and the first and last frame with a key of its own action, or None."""
+    """Sample the ball's own path.
+
+    Returns:
+        frames: (F,) frames.
+        places: the ball's matrix on each of them.
+        ends: first and last frame with a key of its own action, or None.
+    """
     curves, stance = played_before(ball.beyond_mocap_ball.before)
     ends = channels.keyed_range(curves)
     first, last = min(hold.first for hold in holds) - 1, max(hold.last for hold in holds) + 1
@@ -139,19 +168,19 @@ def own_way(
 
 
 def played_before(before: BeyondMocapBefore) -> tuple[dict, list]:
-    """The curves of what a ball played before, and how it stood, as `set_aside.stance_of` has it."""
+    """Find the curves of the ball's own action, and its rest transform as `set_aside.stance_of` stores it."""
     return curves_before(before), json.loads(before.stance)[""]
 
 
 def curves_before(before: BeyondMocapBefore) -> dict:
-    """The curves of what an object played before, by data path and index."""
+    """Find the curves that an object played before, by data path and index."""
     slots = before.action.slots if before.action is not None else ()
     slot = next((one for one in slots if one.identifier == before.slot), None)
     return channels.curves(before.action, slot) if slot is not None else {}
 
 
 def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
-    """Where a ball is on frames (F,), units, by its curves and how it stands without them."""
+    """Sample the ball's matrix on frames (F,), units, from its curves and its transform without them."""
     mode, paths = stance[0], ("location", "rotation_quaternion", "rotation_euler", "rotation_axis_angle")
     still = dict(zip(paths, stance[1:]))
     places, turned = (sample_property(curves, path, frames, still[path]) for path in ("location", channel_of(mode)))
@@ -160,31 +189,36 @@ def way_of(curves: dict, stance: list, frames: np.ndarray) -> list[Matrix]:
 
 
 def sample_property(curves: dict, path: str, frames: np.ndarray, still) -> np.ndarray:
-    """Values (F, n) of a property on frames (F,) by its curves; where it has none as in `still` (n,)."""
+    """Sample values (F, n) of a property on frames (F,); where it has no curve as in `still` (n,)."""
     columns = [channels.sample(curves[path, i], frames) if (path, i) in curves else np.full(len(frames), value)
                for i, value in enumerate(still)]
     return np.stack(columns, axis=1)
 
 
 def check_unaimed(ball: bpy.types.Object) -> None:
-    """InputError for a ball that is aimed or moved by rigid bodies: a hold would not be seen, or the aim be lost."""
+    """Check that a ball is neither aimed nor moved by rigid bodies: a hold would be invisible, or the aim lost.
+
+    Raises:
+        InputError: if it is.
+    """
     aim = ball.beyond_mocap_aim
     if aim.handed:
-        raise InputError(f"ball {ball.name}", "Blender's physics has it", "a ball that is keyed",
+        raise InputError(f"ball {ball.name}", "moved by Blender's physics", "a ball with keys",
                          "press Take Ball Back first")
     if aim.on:
-        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not", "press Leave Aim first")
+        raise InputError(f"ball {ball.name}", "it is aimed", "a ball that is not aimed", "press Leave Aim first")
 
 
 def _check(ball, body, bone: str, first: int, last: int) -> None:
+    """Check that a bone can carry the ball on these frames."""
     channels.check_local(ball)
     channels.check_free(ball)
     check_unaimed(ball)
     if bone not in body.data.bones:
         raise InputError(f"armature {body.name}", f"no bone {bone!r}", "one of its bones",
-                         "look at their names in pose mode")
+                         "find their names in Pose Mode")
     if last <= first:
-        raise InputError("possession", f"from frame {first} to {last}", "a last frame behind the first",
+        raise InputError("possession", f"from frame {first} to {last}", "a last frame after the first one",
                          "set From and To")
     if ball.parent is not None:
         raise InputError(f"ball {ball.name}", f"a child of {ball.parent.name}", "an object without a parent",
@@ -193,17 +227,18 @@ def _check(ball, body, bone: str, first: int, last: int) -> None:
     tracks = playing.nla_tracks if playing is not None and playing.use_nla else ()
     if any(not track.mute and len(track.strips) for track in tracks):
         raise InputError(f"ball {ball.name}", "it plays NLA strips", "an action of its own",
-                         "bake them: NLA editor, Edit, Bake Action")
+                         "bake them in the NLA editor: Edit, Bake Action")
     if ball == body or ball.type == "ARMATURE":
-        raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball beside the armature")
+        raise InputError(f"object {ball.name}", "an armature", "a ball", "select the ball and the armature")
 
 
 def _holds(ball, hold) -> bool:
+    """Whether a stretch still has its armature, bone and constraint."""
     return hold.body is not None and hold.bone in hold.body.pose.bones and hold.name in ball.constraints
 
 
 def _bones(scene, hold) -> list[Matrix]:
-    """The bone's places in the world on the frames of a stretch, without scale."""
+    """Sample the bone's matrices in the world on the frames of a stretch, without scale."""
     found = []
     with alone(hold.body, scene) as side:
         for frame in range(hold.first, hold.last + 1):
@@ -215,13 +250,17 @@ def _bones(scene, hold) -> list[Matrix]:
 
 
 def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None, ball) -> list[Matrix]:
-    """The ball as the bone sees it, on each frame of a stretch: from `start` to where it is carried, and to `end`, both
-    in the world; None: it ends where it is carried."""
+    """Compute the ball's matrix in the bone's frame on each frame of a stretch.
+
+    It moves from `start` to its carried position, and to `end`, both in the world; `end` None: it ends where it is
+    carried.
+    """
     begins = bones[0].inverted() @ start
     held = begins if hold.how == "KEEP" else _touching(scene, hold, begins, ball)
     ends = held if end is None else bones[-1].inverted() @ end
     count = len(bones) - 1
     way = max((held.to_translation() - place.to_translation()).length for place in (begins, ends))
+    # frames that the ball needs at FASTEST for the longer one of both movements
     least = way / units_per_metre(scene) / FASTEST * frames_per_second(scene)
     settle, found = 0, []
     if hold.how != "KEEP" or end is not None:
@@ -237,7 +276,7 @@ def _carried(scene, hold, bones: list[Matrix], start: Matrix, end: Matrix | None
 
 
 def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
-    """The ball where it touches the bone, on the side on which it is."""
+    """Compute the matrix at which the ball touches the bone, on the side on which it is."""
     units = units_per_metre(scene)
     length = hold.body.pose.bones[hold.bone].length * float(np.mean(hold.body.matrix_world.to_scale()))
     centre = begins.to_translation()
@@ -249,15 +288,17 @@ def _touching(scene, hold, begins: Matrix, ball) -> Matrix:
 
 
 def _between(one: Matrix, other: Matrix, share: float) -> Matrix:
-    """From one place to another, smoothly."""
+    """Blend smoothly from one matrix to another."""
     smooth = float(smoothstep(share))
     place = one.to_translation().lerp(other.to_translation(), smooth)
     return Matrix.LocRotScale(place, one.to_quaternion().slerp(other.to_quaternion(), smooth), None)
 
 
 def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
-    """Keys on every frame, and one more just before each on which the ball is let go, after which nothing moves until
-    then: own places are the constraint's before, the world's afterwards."""
+    """Write keys on every frame, and one more just before each release.
+
+    Nothing moves between these two: before a release places are in the constraint's frame, afterwards in the world.
+    """
     rows = [(float(frame), place) for frame, place in zip(frames, own)]
     rows += [(hold.last - JUST_BEFORE, place) for hold, place in lets_go]
     rows.sort(key=lambda row: row[0])
@@ -267,6 +308,7 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
     curves = {"location": ("Object Transforms", np.array([place.to_translation() for _, place in rows])),
               path: ("Object Transforms", _turns(mode, [place.to_quaternion() for _, place in rows]))}
     for hold, _ in lets_go:
+        # influence 1 from the first frame to just before the release
         held = (at >= hold.first) & (at < hold.last)
         influence = f'constraints["{bpy.utils.escape_identifier(hold.name)}"].influence'
         curves[influence] = ("Possession", held[:, None].astype(float))
@@ -275,13 +317,14 @@ def _write(ball, frames: np.ndarray, own: list[Matrix], lets_go: list) -> None:
     made[KEPT] = True
     ends = np.isin(at, [hold.last - JUST_BEFORE for hold, _ in lets_go])
     for (name, _), curve in channels.curves(made, ball.animation_data.action_slot).items():
+        # keys of the influence, and those just before a release, hold their value until the next key
         still = np.ones(len(at), bool) if name.endswith("influence") else ends
         curve.keyframe_points.foreach_set("interpolation", np.where(still, CONSTANT, channels.LINEAR).astype(np.int32))
         curve.update()
 
 
 def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
-    """The values (F, n) of the channel of a rotation mode, each next to the one before."""
+    """Convert rotations to values (F, n) of a rotation mode's channel, each continuous with the one before."""
     found, before = [], None
     for turn in quaternions:
         if mode == "QUATERNION":
@@ -300,5 +343,5 @@ def _turns(mode: str, quaternions: list[Quaternion]) -> np.ndarray:
 
 
 def holder_name(hold) -> str:
-    """Who carries the ball for a while."""
-    return hold.body.name if hold.body is not None else "somebody"
+    """Name of the armature that carries the ball."""
+    return hold.body.name if hold.body is not None else "a missing armature"

@@ -1,4 +1,4 @@
-"""What the panel "Ball & Passes" shows and its operators read. Saved with the file, and known to undo."""
+"""Properties of the panel "Ball & Passes" and its operators. They are saved with the file and covered by undo."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from ..core.properties import active_row, with_settings
 from ..result.result import BeyondMocapBefore
 
 pictures: dict = {}
-"""The painted pictures of hit analyses: a preview collection under "graphs", while there are any."""
+"""Painted pictures of hit analyses: a preview collection under "graphs" if there are any."""
 
 SAMPLES = (("three", "Three", "Three players, a triangle of passes"), ("six", "Six", "Six players, two teams of three"),
            ("volley_net", "Foot Volleyball", "Four players over a net"),
-           ("racquet", "Racquet", "Two players, tools in their hands"),
-           ("dropped", "Dropped Ball", "Three players; one of them errs"))
-PLAYED = "live"  # `made_of` of a scene that was played live: no edit of the lists makes it anew
-KEPT = "beyond_mocap_scene_ball"  # custom property of balls and actions made here; no group has its name
+           ("racquet", "Racquet", "Two players with racquets"),
+           ("dropped", "Dropped Ball", "Three players, one of whom drops the ball"))
+PLAYED = "live"  # `made_of` of a scene that was played live: edits of the lists do not update it
+KEPT = "beyond_mocap_scene_ball"  # custom property of objects and actions created here; no property group has this name
 
 
 def touch_live(_settings, _context) -> None:
-    """A change that a solved scene may have to follow."""
+    """Report a change that the shown scene may have to follow."""
     live.mark("Passing scene")
 
 
 def renamed(player, context) -> None:
-    """A player's new name is his in all passes; one that another has is not taken, or their passes would be one's."""
+    """Write a player's new name to all passes; a name that another player has is refused."""
     if player.known and any(
         row != player and row.name == player.name for row in player.id_data.beyond_mocap_passes.players
     ):
@@ -54,7 +54,7 @@ def renamed(player, context) -> None:
 
 
 def chosen(one, context) -> None:
-    """Which armature shows a strike is known by name also when it has been deleted."""
+    """Store the name of the armature that shows a strike, for when it has been deleted."""
     one.actor_known = one.actor.name if one.actor is not None else ""
 
 
@@ -63,37 +63,37 @@ class BeyondMocapPasser(bpy.types.PropertyGroup):
     """One player of a passing scene."""
 
     name: StringProperty(name="Name", description="What this player is called", update=renamed)
-    known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name by which the passes know him")
+    known: StringProperty(name="Known As", options={"HIDDEN"}, description="The name that the passes use")
     place: PointerProperty(
         name="Place", type=bpy.types.Object, update=touch_live,
-        description="The object that says where the player stands, and by its local X which way he looks; drag it "
-        "with G, turn it with R",
+        description="Object that marks where the player stands and, by its local X, which way they face; move it "
+        "with G, rotate it with R",
     )
     body: PointerProperty(name="Body", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE",
-                          description="The armature that the player's motion is shown on; made where it is missing")
+                          description="Armature that shows the player's motion; created if empty")
     shirt: FloatVectorProperty(name="Shirt", subtype="COLOR", size=3, min=0.0, max=1.0, default=(0.75, 0.05, 0.06),
-                               description="Colour of the shirt")
+                               description="Colour of the player's shirt")
     shown: PointerProperty(name="Shown On", type=bpy.types.Object, options={"HIDDEN"},
-                           description="The armature that shows the scene now; before: what it played")
-    before: PointerProperty(type=BeyondMocapBefore, description="What the body played before the scene was made")
+                           description="The armature that shows the scene now")
+    before: PointerProperty(type=BeyondMocapBefore, description="What the character played before the scene")
 
 
 @with_settings("passes.pass", update=touch_live)
 class BeyondMocapPass(bpy.types.PropertyGroup):
-    """One pass: who sends the ball, to whom and how. Players are named, so that the list may be sorted."""
+    """One pass: passer, receiver and settings. Players are stored by name, so that the list can be sorted."""
 
-    who: StringProperty(name="From", description="Who sends the ball", update=touch_live)
-    to: StringProperty(name="To", description="Who gets it", update=touch_live)
+    who: StringProperty(name="From", description="Player who passes the ball", update=touch_live)
+    to: StringProperty(name="To", description="Player who receives the ball", update=touch_live)
     at: PointerProperty(name="Meet At", type=bpy.types.Object, update=touch_live,
-                        description="An object to which the receiver goes to meet the ball; none: where he stands")
+                        description="Object to which the receiver goes to meet the ball; leave empty to stay in place")
     actor: PointerProperty(
         name="Like Armature", type=bpy.types.Object, poll=lambda _own, thing: thing.type == "ARMATURE", update=chosen,
-        description="An armature whose own motion shows the strike: the one most like it is played, in place "
-        "of Like Clip's",
+        description="Armature whose motion shows the strike; the most similar strike of the library is played, "
+        "and Like Clip is ignored",
     )
     actor_known: StringProperty(
         name="Missing", update=touch_live,
-        description="The armature that showed the strike, which is not there any more; empty it to do without",
+        description="The armature that showed the strike no longer exists; clear this field to go on without it",
     )
 
 
@@ -103,44 +103,44 @@ class BeyondMocapWeights(bpy.types.PropertyGroup):
 
 
 class BeyondMocapTouch(bpy.types.PropertyGroup):
-    """One touch of the ball, as it was solved from tracking. Its name is the player's; empty: nobody known."""
+    """One touch of the ball that was solved from tracking data. Its name is the player's; empty: unknown."""
 
-    player: StringProperty(name="Player", description="Who touches the ball")
-    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=3, description="Second on the track's clock")
-    part: StringProperty(name="Part", description="With what")
-    kind: StringProperty(name="Kind", description="What kind of touch it is")
-    words: StringProperty(name="Words", description="The words that a key moment for it gets")
-    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="How sure it is")
-    use: BoolProperty(name="Use", default=True, description="Whether Accept Touches makes a key moment of it")
+    player: StringProperty(name="Player", description="Player who touches the ball")
+    time: FloatProperty(name="Time", unit="TIME_ABSOLUTE", precision=3, description="Seconds on the track's clock")
+    part: StringProperty(name="Part", description="Part of the body that touches the ball")
+    kind: StringProperty(name="Kind", description="Kind of touch")
+    words: StringProperty(name="Labels", description="Labels of the key moment for this touch")
+    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, description="Confidence of this touch, from 0 to 1")
+    use: BoolProperty(name="Use", default=True, description="Make a key moment of this touch with Accept Touches")
 
 
 @with_settings("ball.held")
 class BeyondMocapHold(bpy.types.PropertyGroup):
     """A stretch in which a bone carries the ball. Its name is that of the ball's constraint."""
 
-    body: PointerProperty(name="Body", type=bpy.types.Object, description="The armature that carries the ball")
-    bone: StringProperty(name="Bone", description="The bone that carries it")
-    first: IntProperty(name="First Frame", description="From this frame on")
-    last: IntProperty(name="Last Frame", description="The frame on which the ball is let go")
+    body: PointerProperty(name="Body", type=bpy.types.Object, description="Armature that carries the ball")
+    bone: StringProperty(name="Bone", description="Bone that carries the ball")
+    first: IntProperty(name="First Frame", description="First frame on which the ball is carried")
+    last: IntProperty(name="Last Frame", description="Frame on which the ball is released")
 
 
 class BeyondMocapBall(bpy.types.PropertyGroup):
-    """What a ball keeps: who carries it when, and what it played before."""
+    """Stretches in which a ball is carried, and what it played before."""
 
     attached_to = ("Object.beyond_mocap_ball",)
 
-    holds: CollectionProperty(type=BeyondMocapHold, description="Who carries the ball, and when")
-    before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before somebody carried it")
+    holds: CollectionProperty(type=BeyondMocapHold, description="Stretches in which an armature carries the ball")
+    before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before it was carried")
 
 
 @with_settings("hits")
 class BeyondMocapHits(bpy.types.PropertyGroup):
-    """What an armature keeps of its hit analysis."""
+    """Stored hit analysis of an armature."""
 
     attached_to = ("Object.beyond_mocap_hits",)
 
-    found: StringProperty(name="Found", options={"HIDDEN"}, description="What was found, as JSON")
-    lines: StringProperty(name="Lines", options={"HIDDEN"}, description="A line for each hit motion: frame, text")
+    found: StringProperty(name="Found", options={"HIDDEN"}, description="Result of the hit analysis as JSON")
+    lines: StringProperty(name="Lines", options={"HIDDEN"}, description="One line for each hit motion: frame and text")
 
 
 @with_settings("passes", update=touch_live)
@@ -150,30 +150,30 @@ class BeyondMocapPasses(bpy.types.PropertyGroup):
 
     attached_to = ("Scene.beyond_mocap_passes",)
 
-    players: CollectionProperty(type=BeyondMocapPasser, description="Who keeps the ball going")
-    active_player: IntProperty(name="Player", min=0, description="The player that is shown below the list")
-    passes: CollectionProperty(type=BeyondMocapPass, description="The passes, one after the other")
-    active_pass: IntProperty(name="Pass", min=0, description="The pass that is shown below the list")
-    weights: PointerProperty(type=BeyondMocapWeights, description="What counts how much where motions are compared")
+    players: CollectionProperty(type=BeyondMocapPasser, description="Players of the passing scene")
+    active_player: IntProperty(name="Player", min=0, description="Player whose settings are shown below the list")
+    passes: CollectionProperty(type=BeyondMocapPass, description="Passes in their order")
+    active_pass: IntProperty(name="Pass", min=0, description="Pass whose settings are shown below the list")
+    weights: PointerProperty(type=BeyondMocapWeights, description="Weights for comparing motions")
     library_folder: StringProperty(
         name="Library", subtype="DIR_PATH", options={"PATH_SUPPORTS_BLEND_RELATIVE"}, update=touch_live,
-        description="Folder of clips with strikes from a stand; empty: the library of step 1",
+        description="Folder of clips with standing strikes; leave empty for the library of step 1",
     )
     rally: PointerProperty(name="Ball Object", type=bpy.types.Object,
-                           description="The ball of the scene; made where it is missing")
+                           description="Ball of the scene; created if empty")
     ball_before: PointerProperty(type=BeyondMocapBefore, description="What the ball played before the scene was made")
     made_of: StringProperty(name="Made Of", options={"HIDDEN"},
-                            description="Digest of what the scene shown was made of")
-    told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
-    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Lines about the scene that is shown")
-    strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="A line for each strike: frame, text")
-    touches: CollectionProperty(type=BeyondMocapTouch, description="Touches that were solved from tracking")
-    active_touch: IntProperty(name="Touch", min=0, description="The touch that is picked in the list")
-    solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Lines about the ball that was solved")
+                            description="Digest of the settings of the shown scene")
+    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Warnings and messages about the scene")
+    figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the shown scene")
+    strikes: StringProperty(name="Strikes", options={"HIDDEN"}, description="One line for each strike: frame and text")
+    touches: CollectionProperty(type=BeyondMocapTouch, description="Touches that were solved from tracking data")
+    active_touch: IntProperty(name="Touch", min=0, description="Touch selected in the list")
+    solved: StringProperty(name="Solved", options={"HIDDEN"}, description="Figures of the solved ball")
 
 
 def subject(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The armature that is meant: the active object, or else the body of the picked player."""
+    """Find the armature to work on: the active object, otherwise the character of the active player."""
     active = context.view_layer.objects.active
     if active is not None and active.type == "ARMATURE":
         return active
@@ -183,7 +183,7 @@ def subject(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def ball_of(context: bpy.types.Context) -> bpy.types.Object | None:
-    """The ball that is meant: one that is selected, else that of the passing scene, else one called Ball."""
+    """Find the ball to work on: a selected one, otherwise that of the passing scene, otherwise one named Ball."""
     chosen = [thing for thing in context.selected_objects if thing.type in {"MESH", "EMPTY"}]
     marked = [thing for thing in chosen if thing.get(KEPT) or "ball" in thing.name.lower()] or chosen[:1]
     if marked:
@@ -195,22 +195,22 @@ def ball_of(context: bpy.types.Context) -> bpy.types.Object | None:
 
 
 def told_lines(text: str) -> list[tuple[int, str]]:
-    """Frame and text of lines as they are kept in `lines` and `strikes`."""
+    """Parse frame and text of the lines stored in `lines` and `strikes`."""
     rows = (line.partition("\t") for line in text.splitlines())
     return [(int(frame), said) for frame, _, said in rows]
 
 
 def found_of(hits: BeyondMocapHits) -> dict:
-    """What a hit analysis found; empty where there was none."""
+    """Parse the stored hit analysis; empty if there is none."""
     return json.loads(hits.found or "{}")
 
 
 def picture_name(hits: BeyondMocapHits) -> str:
-    """The name of the picture of an analysis: another one for other curves."""
+    """Compute the name of an analysis' picture; other curves give another name."""
     return byte_digest(hits.found, size=8).hex()
 
 
 def picture_icon(hits: BeyondMocapHits) -> int:
-    """The picture's number for a layout; 0 while it is not painted (`hits_shown.paint`)."""
+    """Find the picture's icon number for a layout; 0 until it is painted."""
     kept, name = pictures.get("graphs"), picture_name(hits)
     return kept[name].icon_id if kept is not None and name in kept else 0

@@ -1,5 +1,6 @@
-"""The objects that show a passing scene: those that were made for it go, those of the user's play their own motion
-again. What a player strikes with, such as a racquet, is an object that goes with the hand: where the core's contact is.
+"""Objects that show a passing scene: those created for it are removed, the user's own play their own motion again.
+
+A tool such as a racquet is an object parented to the hand, placed where the core computes contacts.
 """
 
 from __future__ import annotations
@@ -16,13 +17,17 @@ from ..core.set_aside import bring_back, drop
 from ..rigs import armature
 from .settings import KEPT, BeyondMocapPasser
 
-HANDLE = 0.6  # of the thickness of what strikes
-TOOL = "tool"  # tells it from balls that the user has tied to a hand
+HANDLE = 0.6  # of the thickness of the part that strikes
+TOOL = "tool"  # distinguishes it from balls that the user has parented to a hand
 _SIDES = 12
 
 
 def check(*rows: BeyondMocapPasser) -> None:
-    """InputError where the body that shows a player's motion cannot be given back."""
+    """Check that the characters of players can be released.
+
+    Raises:
+        InputError: if one cannot.
+    """
     for row in rows:
         if row.shown is not None:
             channels.check_local(row.shown)
@@ -30,7 +35,7 @@ def check(*rows: BeyondMocapPasser) -> None:
 
 
 def let_go(row: BeyondMocapPasser) -> None:
-    """A player's body shows the scene no more. Call `check` before."""
+    """Stop showing the scene on a player's character. Call `check_characters` first."""
     body, row.shown = row.shown, None
     if body is not None:
         remove_tool(body)
@@ -42,10 +47,10 @@ def let_go(row: BeyondMocapPasser) -> None:
 
 
 def remove(thing: bpy.types.Object) -> None:
-    """Take an object of ours out of the file, with what hangs on it that is ours, its data and its action."""
+    """Remove an object created here from the file, with its children created here, its data and its action."""
     for child in [child for child in thing.children if child.get(KEPT)]:
         remove(child)
-    if thing.children or thing.library is not None:  # the user has tied things to it
+    if thing.children or thing.library is not None:  # the user has parented objects to it
         return
     channels.discard(thing, KEPT)
     data = thing.data
@@ -55,7 +60,7 @@ def remove(thing: bpy.types.Object) -> None:
 
 
 def show_tool(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, collection) -> bpy.types.Object:
-    """The tool (`ball.contact.Tool`) in a body's hand, in place of the one before."""
+    """Create the tool (`ball.contact.Tool`) in a character's hand; the previous one is removed."""
     remove_tool(body)
     skeleton = armature.skeleton_of(body, scene)
     hand = getattr(identify(skeleton), side or "right").hand
@@ -84,7 +89,7 @@ def show_tool(scene: bpy.types.Scene, body: bpy.types.Object, tool, side: str, c
 
 
 def remove_tool(body: bpy.types.Object) -> None:
-    """Take the tool out of a body's hand."""
+    """Remove the tool from a character's hand."""
     for child in [child for child in body.children if child.get(KEPT) == TOOL]:
         mesh = child.data
         bpy.data.objects.remove(child)

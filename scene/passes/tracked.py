@@ -1,4 +1,5 @@
-"""The ball of imported tracking, solved: as an object of its own, and its touches as proposals for key moments."""
+"""The ball of imported tracking data, solved: as an object of its own, with its touches as proposals for key moments.
+"""
 
 from __future__ import annotations
 
@@ -26,15 +27,24 @@ if TYPE_CHECKING:
 
 BALL = "Solved Ball"
 WORDS = {kind.name: " ".join(kind.labels) for kind in TOUCH_KINDS if kind.labels and kind.ball != "carries"}
-"""Kind of a touch -> words of its key moment; dribbles are stretches, deflections nobody's wish."""
+"""Kind of a touch -> labels of its key moment. Dribbles are stretches and deflections are unintended: they have none.
+"""
 
-NEAR = 0.4  # seconds between a touch and a key moment that is there already
+NEAR = 0.4  # s between a touch and an existing key moment within which no moment is added
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """What is to be solved. tracks: (name, track) of players with files of their own; or path, metadata and provider of
-    a whole match. start, end: seconds; end None: to its end."""
+    """Order for solving the ball.
+
+    Attributes:
+        tracks: (name, track) of players with files of their own; empty for a match.
+        path: tracking file of a match.
+        metadata: its metadata file.
+        provider: its provider.
+        start: s; None: from the beginning.
+        end: s; None: to the end.
+    """
 
     tracks: tuple = ()
     path: str = ""
@@ -45,8 +55,11 @@ class Order:
 
 
 def order_of(scene: bpy.types.Scene) -> Order:
-    """What the settings ask for: the match of the active player, or the tracks of all ticked players with files of
-    their own. InputError where nobody has a file."""
+    """Build the order: the match of the active player, or the tracks of all selected players with files of their own.
+
+    Raises:
+        InputError: if no player has a file.
+    """
     settings = scene.beyond_mocap
     player = active_player(settings)
     if player is None or not player.tracking_file:
@@ -60,7 +73,7 @@ def order_of(scene: bpy.types.Scene) -> Order:
 
 
 def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
-    """Read what has to be read, and solve; never touches bpy's data."""
+    """Read the files and solve the ball. Does not use bpy."""
     from ...beyond_mocap.ball.tracked.solve import solve_ball
 
     if order.tracks:
@@ -72,7 +85,9 @@ def work(order: Order, progress, cancelled, _hurry) -> "SolvedBall":
 
 
 def together(named: tuple):
-    """The tracks of several players, (name, track) each, as one match at the first one's times; one stays a track."""
+    """Join the tracks of several players, (name, track) each, to a match at the first one's times; one track stays a
+    track.
+    """
     from ...beyond_mocap.ball.tracked.solve import PITCH
     from ...beyond_mocap.files.tracking.tracking import Match, MatchPlayer
 
@@ -91,7 +106,11 @@ def together(named: tuple):
 
 
 def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
-    """The ball on its solved way, on every frame of the scene; its touches in the list. Returns the ball."""
+    """Create or update the solved ball on every frame of the scene, and list its touches.
+
+    Returns:
+        The ball.
+    """
     from ...beyond_mocap.motion.track.ball_path import BallPath
 
     settings, room = scene.beyond_mocap_passes, bake.collection(scene)
@@ -102,11 +121,13 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
     possession.check_unaimed(target)
     clock, (start, end) = scene_clock(scene), (float(solved.times[0]), float(solved.times[-1]))
     frames = np.arange(np.ceil(clock.frame(start) - 1e-4), np.floor(clock.frame(end) + 1e-4) + 1)
+    # seconds of the scene's frames on the track's clock
     times = clock.start_time + (frames - clock.start_frame) / frames_per_second(scene)
     path = BallPath(times, solved.ball.at(times), np.ones(len(times), bool))
-    target[KEPT] = BALL  # under any name
+    target[KEPT] = BALL  # marks it, whatever its name is
 
     def lay() -> None:
+        """Write the path to the ball's action."""
         channels.discard(target, KEPT)
         ball.write(target, path, scene, bake.frame_at(scene, float(times[0])))[KEPT] = True
 
@@ -117,7 +138,12 @@ def write(scene: bpy.types.Scene, solved: "SolvedBall") -> bpy.types.Object:
 
 
 def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
-    """Make key moments of the ticked touches (of one player, or of all); how many, and a line for each that failed."""
+    """Add key moments for the selected touches, of one player or of all.
+
+    Returns:
+        count: number of key moments added.
+        messages: one line for each touch that was not used.
+    """
     settings, told, count = context.scene.beyond_mocap, [], 0
     found = {player.name: player for player in settings.players}
     for touch in context.scene.beyond_mocap_passes.touches:
@@ -126,7 +152,7 @@ def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
         player = found[touch.name]
         try:
             line = _in_the_way(context, player, touch)
-        except InputError as error:  # his track or words cannot be read; others go on
+        except InputError as error:  # this player's track or labels cannot be read; go on with the others
             line = str(error)
         if line:
             told.append(line)
@@ -138,18 +164,18 @@ def accept(context: bpy.types.Context, only: str = "") -> tuple[int, list[str]]:
 
 
 def lines(solved: "SolvedBall") -> list[str]:
-    """Lines about a solved ball for the panel."""
+    """List lines about a solved ball for the panel."""
     residual = solved.residuals[solved.measured & np.isfinite(solved.residuals)]
     told = [f"Touches: {len(solved.touches)}", f"Confidence: {solved.confidence:.0%}"]
     if len(residual):
-        told.append(f"Off the samples: {100 * np.median(residual):.0f} cm")
+        told.append(f"Median residual: {100 * np.median(residual):.0f} cm")
     told += [f"Filled samples: {solved.filled.mean():.0%}", f"Outliers: {int(solved.outlier.sum())}"]
     told += [f"{end.kind.capitalize()}: {end.time:.2f} s" for end in solved.ends]
     return told + list(solved.notes)
 
 
 def _list(scene, solved: "SolvedBall") -> None:
-    """The touches as rows; names of players by their ids in the feed."""
+    """List the touches as rows; players are named by their ids in the feed."""
     names = {player.feed_id: player.name for player in scene.beyond_mocap.players if player.feed_id}
     rows = scene.beyond_mocap_passes.touches
     rows.clear()
@@ -163,14 +189,14 @@ def _list(scene, solved: "SolvedBall") -> None:
 
 
 def _in_the_way(context, player: BeyondMocapPlayer, touch) -> str:
-    """Why a touch becomes no key moment of a player; "" where it may. He has a timeline afterwards."""
+    """Describe why a touch becomes no key moment of a player, or return ""; the player has a timeline afterwards."""
     target = strips.with_lanes(context, player)
     clock = scene_clock(context.scene)
     first, last = (clock.seconds(frame) for frame in dots.keyed_frames(player.dot) or (-np.inf, np.inf))
     if not first <= touch.time <= last:
-        return f"{player.name}: the touch at {touch.time:.2f} s is outside his track"
+        return f"{player.name}: the touch at {touch.time:.2f} s is outside the player's track"
     near = [moment for moment in lanes.moments(target) if abs(moment.key.time - touch.time) < NEAR]
     if near:
-        there = f"{player.name}: has a key moment at {near[0].key.time:.2f} s"
-        return f"{there}, so none is added for the touch at {touch.time:.2f} s"
+        there = f"{player.name}: there is a key moment at {near[0].key.time:.2f} s"
+        return f"{there}, so the touch at {touch.time:.2f} s adds none"
     return ""

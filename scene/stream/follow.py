@@ -1,8 +1,8 @@
-"""The stream that is listened to, and the armature that does what the user does: kept up to date, with the figures and
-what is made of hits, from a timer where there is a window, from scripts by calling `look`.
+"""The stream that is received, and the armature that follows the user.
 
-What arrives never changes anything but the streamed body's pose. It is made when its first frame is here. The user
-begins and ends the one listener of the session; it ends too when a file is loaded or the add-on goes.
+A timer updates it where there is a window; scripts call `update_stream`. What arrives changes nothing but the pose of
+the streamed character, which is created with the first frame. The user starts and stops the one listener of the
+session; it also stops when a file is loaded or the extension is disabled.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from ..result import bake
 from ..rigs import armature
 from ..stage import body
 
-TICK, IDLE = 1.0 / 60.0, 0.25
-TOLD_EVERY, LOOKED_EVERY = 0.25, 0.1
-MOST_BODIES = 20  # streamed bodies that a session makes: a sender that changes its skeleton again and again is stopped
+TICK, IDLE = 1.0 / 60.0, 0.25  # s between two timer calls, with and without a stream
+TOLD_EVERY, LOOKED_EVERY = 0.25, 0.1  # s between two status updates, and two hit detections
+MOST_BODIES = 20  # characters created in one stream: a sender that keeps changing its skeleton is stopped
 
 MARK = "beyond_mocap_stream"
 SHIRT = (0.55, 0.55, 0.58)
@@ -44,31 +44,31 @@ _on_look: list = []
 
 
 def on_hit(call) -> None:
-    """`call(scene, hit, seconds)` is called for every strike that is recognised, until `forget`."""
+    """Call `call(scene, hit, seconds)` for every detected strike, until `remove_call`."""
     _on_hit.append(call)
 
 
 def on_look(call) -> None:
-    """`call(scene)` is called at every look, until `forget`."""
+    """Call `call(scene)` at every update, until `remove_call`."""
     _on_look.append(call)
 
 
 def forget(call) -> None:
-    """Call it no more."""
+    """Stop calling `call`."""
     for calls in (_on_hit, _on_look):
         if call in calls:
             calls.remove(call)
 
 
 def began() -> None:
-    """A stream has been started."""
+    """Reset the status for a stream that has started."""
     _state.update(seen=0, told=0.0, looked=0.0, bodies=0)
     _shown.clear()
     tell()
 
 
 def look(scene: bpy.types.Scene) -> HitMotion | None:
-    """Show what has arrived in a scene, tell how it does, and say which strike has just been recognised, if any."""
+    """Show what has arrived in a scene, update the status, and return the strike that was just detected, if any."""
     listener = current_listener()
     found = _receive(scene, listener) if listener is not None else None
     for call in list(_on_look):
@@ -77,13 +77,14 @@ def look(scene: bpy.types.Scene) -> HitMotion | None:
 
 
 def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
+    """Pose the character by the latest frame, detect hits, and update the status."""
     now = time.monotonic()
     latest = listener.latest()
     if latest is not None and latest.number != _state["seen"]:
         _state["seen"] = latest.number
         if _show(scene, listener, latest) == "posed":
             _shown.append(time.monotonic() - (latest.time if latest.sent is None else latest.sent))
-        if current_listener() is None:  # given up
+        if current_listener() is None:  # the stream has been stopped
             return None
     found = None
     if now - _state["looked"] >= LOOKED_EVERY:
@@ -96,23 +97,29 @@ def _receive(scene: bpy.types.Scene, listener: Listener) -> HitMotion | None:
 
 
 def _show(scene, listener: Listener, latest) -> str:
-    """Pose the streamed body: "posed", "made" where it had to be made first, "" where it could not be."""
+    """Pose the streamed character.
+
+    Returns:
+        "posed", "made" if it was created first, or "" if it could not be created.
+    """
     settings, (skeleton, root, rotations) = scene.beyond_mocap_stream, poses([latest])
     made = "posed"
     if not can_show(settings.body, scene, skeleton):
         if _state["bodies"] >= MOST_BODIES:
-            _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is left: look at the sender")
+            _give_up(f"The skeleton has changed {MOST_BODIES} times, so the stream is stopped: check the sender")
             return ""
         _state["bodies"] += 1
         settings.body = create_body(bpy.context, Motion(skeleton, root, rotations, 60.0))
+        # one undo step, so that undo does not remove the new character silently
         if not bpy.app.background:
-            bpy.ops.ed.undo_push(message="Streamed Body")
+            bpy.ops.ed.undo_push(message="Streamed Character")
         made = "made"
     pose_body(settings.body, scene, skeleton, root[0], rotations[0])
     return made
 
 
 def _hit(scene) -> HitMotion | None:
+    """Detect a strike, show it in the panel and pass it on."""
     try:
         found = _held["hits"].look()
     except BeyondMocapError as error:
@@ -129,23 +136,23 @@ def _hit(scene) -> HitMotion | None:
 
 
 def tell() -> None:
-    """Write down for the panel how the stream does."""
+    """Write the status of the stream for the panel."""
     told, listener = bpy.context.window_manager.beyond_mocap_streaming, current_listener()
     if listener is None:
         told.on, told.state, told.line, told.figures = False, "stopped", "", ""
         return
     status = listener.status()
-    lines = [f"Frames: {status.frames}", f"Frames a Second: {status.rate:.0f}"]
+    lines = [f"Frames: {status.frames}", f"Frame Rate: {status.rate:.0f}"]
     if _shown and status.state == "receiving":
         what = "Latency" if status.way is not None else "Latency, from Arrival"
         lines.append(f"{what}: {1000.0 * statistics.median(_shown):.0f} ms")
     if status.rubbish:
-        lines.append(f"Left Out: {status.rubbish}")
+        lines.append(f"Invalid Pieces: {status.rubbish}")
     told.on, told.state, told.line, told.figures = True, status.state, status.line, "\n".join(lines)
 
 
 def _give_up(why: str) -> None:
-    """The stream ends by itself; what is told stays."""
+    """Stop the stream because of an error; its message stays."""
     stop_listening()
     tell()
     told = bpy.context.window_manager.beyond_mocap_streaming
@@ -153,6 +160,7 @@ def _give_up(why: str) -> None:
 
 
 def _tick() -> float:
+    """Update the stream, and return the seconds until the next call."""
     if current_listener() is None and not _on_look:
         if bpy.context.window_manager.beyond_mocap_streaming.on:
             tell()
@@ -163,7 +171,7 @@ def _tick() -> float:
     before = (told := bpy.context.window_manager.beyond_mocap_streaming).figures, told.played
     for shown in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=shown):
-            attempt(lambda: look(shown.scene), _give_up, "The stream has ended by an error")
+            attempt(lambda: look(shown.scene), _give_up, "The stream has stopped because of an error")
     told = bpy.context.window_manager.beyond_mocap_streaming
     if (told.figures, told.played) != before:
         window.redraw()
@@ -177,12 +185,17 @@ def _end() -> None:
 
 
 def start_listening(settings) -> Listener:
-    """Listen as the settings say. InputError, and nothing changed, if the port is taken or the suit's file is none."""
+    """Start to listen as the settings say.
+
+    Raises:
+        InputError: if a stream is received already, the port is in use, or the suit's file is no BVH file; nothing is
+        changed then.
+    """
     clip = bpy.path.abspath(settings.clip) if settings.clip else ""
     hierarchy = hierarchy_of(clip) if clip else None
     before = current_listener()
     if before is not None:
-        raise InputError(f"port {before.port}", "a stream is listened to already", "one at a time", "press Stop Stream")
+        raise InputError(f"port {before.port}", "a stream is already received", "one at a time", "press Stop Stream")
     one = Listener(settings.port, settings.protocol, hierarchy, settings.unit or None).start()
     _held["listener"] = one
     _held["hits"] = LiveHits(one, settings.part, "" if settings.side == "either" else settings.side,
@@ -191,7 +204,7 @@ def start_listening(settings) -> Listener:
 
 
 def stop_listening() -> None:
-    """Listen no more."""
+    """Stop listening."""
     one = _held.pop("listener", None)
     _held.clear()
     if one is not None:
@@ -199,7 +212,7 @@ def stop_listening() -> None:
 
 
 def current_listener() -> Listener | None:
-    """The listener, where there is one."""
+    """The listener of the session, or None."""
     return _held.get("listener")
 
 
@@ -207,7 +220,7 @@ WATCHER = Watcher(name="Stream", look=_tick, closing=stop_listening, ends=_end)
 
 
 def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: Skeleton) -> bool:
-    """Whether an object can show this skeleton: an armature of the scene, of this file, with a bone for every joint."""
+    """Whether an object can show this skeleton: an armature of the scene and file with a bone for every joint."""
     return (
         thing is not None and thing.type == "ARMATURE" and thing.library is None and thing.name in scene.objects
         and all(name in thing.data.bones for name in skeleton.names)
@@ -215,7 +228,7 @@ def can_show(thing: bpy.types.Object | None, scene: bpy.types.Scene, skeleton: S
 
 
 def create_body(context: bpy.types.Context, motion: Motion, name: str = "Stream") -> bpy.types.Object:
-    """A dressed armature for the body that `motion` shows."""
+    """Create a character with the skeleton of `motion`."""
     where = bake.collection(context.scene)
     thing = armature.create(context, motion.skeleton, name, where)
     body.create(thing, name, SHIRT, collection=where, scene=context.scene, example=motion)
@@ -226,12 +239,23 @@ def create_body(context: bpy.types.Context, motion: Motion, name: str = "Stream"
 def pose_body(
     thing: bpy.types.Object, scene: bpy.types.Scene, skeleton: Skeleton, root: np.ndarray, local: np.ndarray
 ) -> None:
-    """Put an armature into a pose: root (3,) m and local rotations (J, 4). Where the object lies and which way it is
-    turned about the vertical is left to the user, so that the streamed body can stand beside others."""
+    """Pose an armature.
+
+    Its location and its rotation about the vertical are left to the user, so that it can stand beside other characters.
+
+    Args:
+        thing: the armature.
+        scene: the scene.
+        skeleton: skeleton of the pose.
+        root: (3,) m, root position.
+        local: (J, 4) local rotations.
+    """
     lie, rest = armature.placement_now(thing, scene), armature.rest_rotations(thing, skeleton.names)
+    # the object's rotation about the vertical turns the streamed motion with it
     turn = quaternion.about_up(quaternion.yaw(lie.rotation))
     root, local = lie.origin + quaternion.rotate(turn, root), np.array(local)
     local[0] = quaternion.multiply(quaternion.inverse(lie.rotation), quaternion.multiply(turn, local[0]))
+    # pose rotations are relative to the bones' rest rotations
     turned = quaternion.multiply(quaternion.inverse(rest), quaternion.multiply(local, rest))
     bones = thing.pose.bones
     every = np.empty((len(bones), 4), np.float32)
@@ -240,13 +264,13 @@ def pose_body(
     bones.foreach_set("rotation_quaternion", every.ravel())
     top = bones[skeleton.names[0]]
     shift = lie.to_armature(root) - np.array(top.bone.head_local)
-    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # also tells Blender that the pose is another
+    top.location = quaternion.rotate(quaternion.inverse(rest[0]), shift)  # assigning also makes Blender update
 
 
 def keep_recording(context: bpy.types.Context, motion: Motion, name: str = "Recorded") -> bpy.types.Object:
-    """A body of its own that plays `motion` from the present frame on."""
+    """Create a character that plays `motion` from the current frame on."""
     if motion.duration * frames_per_second(context.scene) < 1.0:
-        raise InputError("stream", "less than a frame", "a second or more of it", "let the stream run for a while")
+        raise InputError("stream", "less than a frame", "a second or more", "let the stream run for a while")
     thing = create_body(context, motion, name)
     action.write(thing, motion, context.scene, float(context.scene.frame_current), f"{thing.name} motion")
     return thing

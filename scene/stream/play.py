@@ -1,7 +1,7 @@
-"""Play live: while the scene plays, who has the ball does what the user does, and passes to whom the user has chosen.
+"""Play Live: while the scene plays, the holder of the ball repeats the user's strikes and passes to the chosen player.
 
-What the user does is recognised by `follow`; the pass is worked out in a thread, from where all stand, and laid into
-the running scene as soon as it is there. The bodies and the ball are those of the passing scene.
+`follow` detects the user's strikes. The pass is computed in a thread, from where all players stand, and inserted into
+the running scene when it is ready. The characters and the ball are those of the passing scene.
 """
 
 from __future__ import annotations
@@ -31,7 +31,13 @@ _held: dict[str, object] = {}
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A rally that can begin. order: as `make.order_of` writes it; library; rally."""
+    """A rally that is ready to start.
+
+    Attributes:
+        order: as `generate.build_order` builds it.
+        library: the library.
+        rally: the rally.
+    """
 
     order: make.Order
     library: Library
@@ -39,7 +45,7 @@ class Begun:
 
 
 def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> Begun:
-    """Build the library where it is not there yet, and let everybody stand. Never touches bpy."""
+    """Build the library if it is not loaded, and start a rally with all players standing. Does not use bpy."""
     from ...beyond_mocap.library.build import build
     from ...beyond_mocap.passes import live_passes
 
@@ -51,7 +57,7 @@ def begin(order: make.Order, holder: str, start: float, progress, cancelled) -> 
 
 
 def show(scene: bpy.types.Scene, begun: Begun) -> None:
-    """Lay it on bodies and ball, and answer the user's strikes from now on."""
+    """Apply a rally to characters and ball, and answer the user's strikes from now on."""
     stop()
     make.session.keep_library(begun.library, begun.order.unit)
     _held.update(scene=scene.session_uid, library=begun.library, rally=begun.rally, seen=None, took=0.0)
@@ -65,7 +71,7 @@ def show(scene: bpy.types.Scene, begun: Begun) -> None:
 
 
 def stop() -> None:
-    """Answer no more; what was played stays."""
+    """Stop answering; what was played stays."""
     background.stop("live")
     follow.forget(struck)
     follow.forget(look)
@@ -73,33 +79,37 @@ def stop() -> None:
 
 
 def rally() -> Rally | None:
-    """The rally that is played."""
+    """The rally that is being played, or None."""
     return _held.get("rally")
 
 
 def seconds(scene: bpy.types.Scene) -> float:
-    """Where the scene is, on the rally's clock."""
+    """Compute the scene's time on the rally's clock."""
     return (scene.frame_current_final - scene.beyond_mocap_passes.start_frame) / frames_per_second(scene)
 
 
 def target(scene: bpy.types.Scene) -> str:
-    """To whom the next pass goes: who was chosen, else the next one of the list."""
+    """Find the receiver of the next pass: the chosen player, otherwise the next one in the list."""
     names = [row.name for row in scene.beyond_mocap_passes.players]
     chosen, holder = scene.beyond_mocap_stream.target, rally().holder
     if chosen in names and chosen != holder:
         return chosen
     if not names:
-        raise InputError("players", "nobody is in the list", "two or more", "take a sample, and press Play Live again")
+        raise InputError("players", "the list is empty", "two or more", "choose a sample, and press Play Live again")
     return names[(names.index(holder) + 1) % len(names)] if holder in names else names[0]
 
 
 def struck(_scene: bpy.types.Scene, hit: HitMotion, _seconds: float) -> None:
-    """The user has struck: the newest strike counts."""
+    """Store the user's strike; only the latest one counts."""
     _held["pending"] = hit
 
 
 def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
-    """The strike of an armature's own motion that is nearest to the present frame. InputError where there is none."""
+    """Find the strike of an armature's own motion that is nearest to the current frame.
+
+    Raises:
+        InputError: if it has none.
+    """
     from ...beyond_mocap.passes.hits import analyse
 
     settings, motion = scene.beyond_mocap_stream, action.read(body, scene)
@@ -107,18 +117,18 @@ def shown_by(scene: bpy.types.Scene, body: bpy.types.Object) -> HitMotion:
     sides = (("left", "right") if settings.side == "either" else (settings.side,)) if sided else ("",)
     hits = [hit for side in sides for hit in analyse(motion, settings.part, side, settings.threshold or None).motions]
     if not hits:
-        raise InputError(f"armature {body.name}", f"no strike of the {settings.part}", "one",
+        raise InputError(f"armature {body.name}", f"no strike with the {settings.part}", "at least one",
                          "choose the part under Live Stream")
     now = scene.frame_current - (action.first_frame(body) or 0)
     return min(hits, key=lambda hit: (abs(hit.key - now), -hit.max_speed))
 
 
 def look(scene: bpy.types.Scene) -> None:
-    """Begin a pass that is asked for, or lay one that is ready."""
+    """Start a requested pass, or insert one that is ready."""
     if rally() is None or scene.session_uid != _held["scene"]:
         return
     if scene.beyond_mocap_passes.made_of != PLAYED:
-        _over("The scene has been made anew or cleared: press Play Live to go on")
+        _over("The scene has been updated or cleared: press Play Live to continue")
         return
     _chosen(scene)
     job = _held.get("job")
@@ -135,15 +145,17 @@ def look(scene: bpy.types.Scene) -> None:
 
 
 def answer_now(scene: bpy.types.Scene, hit: HitMotion) -> Piece:
-    """The same at once, for scripts: the pass is worked out and laid before this comes back."""
+    """Answer a strike at once, for scripts: the pass is computed and inserted before this returns."""
     if rally() is None:
-        raise InputError("play live", "nothing is played", "a rally", "press Play Live")
+        raise InputError("play live", "no rally is being played", "a rally", "press Play Live")
     piece = _answer(*_order(scene, hit), None, None)
     _apply(scene, piece)
     return piece
 
 
 def _order(scene, hit: HitMotion) -> tuple:
+    """Collect what a pass needs: library, rally, time, hit, receiver, bounces."""
+    # not before the holder can act
     now = max(seconds(scene), rally().free)
     return _held["library"], rally(), now, hit, target(scene), scene.beyond_mocap_stream.bounces
 
@@ -155,6 +167,7 @@ def _answer(library, one, now: float, hit: HitMotion, to: str, bounces: int, pro
 
 
 def _ended(scene, job) -> None:
+    """Insert a pass that is ready, or show its error."""
     try:
         if job.error is not None:
             raise job.error
@@ -167,7 +180,7 @@ def _ended(scene, job) -> None:
 
 
 def _apply(scene, piece: Piece) -> None:
-    """Lay a pass into the scene, from now on."""
+    """Insert a pass into the scene from now on."""
     after = rally().after(piece, max(seconds(scene), rally().free))
     _lay(scene, after, list(piece.motions))
     _held["rally"] = after
@@ -176,11 +189,13 @@ def _apply(scene, piece: Piece) -> None:
 
 
 def _lay(scene, one: Rally, names: list[str]) -> None:
+    """Apply a rally's motions and ball to the named players."""
     from ...beyond_mocap.passes.passes import ball_of
 
+    # players may have been renamed or removed since the rally started
     rows = {row.name: row for row in scene.beyond_mocap_passes.players}
     if missing := [name for name in names if name not in rows]:
-        raise InputError("players", f"{missing[0]} is gone from the list", "the same players", "press Play Live again")
+        raise InputError("players", f"{missing[0]} is not in the list now", "the same players", "press Play Live again")
     channels.check_local(*(rows[name].body for name in names), scene.beyond_mocap_passes.rally)
     start = float(scene.beyond_mocap_passes.start_frame)
     for name in names:
@@ -191,26 +206,28 @@ def _lay(scene, one: Rally, names: list[str]) -> None:
 
 
 def _chosen(scene) -> None:
-    """A player that has just been clicked is the target."""
+    """Make a player that has just been clicked the target."""
     active = bpy.context.view_layer.objects.active
     name = active.name if active is not None else None
     if name == _held.get("seen"):
         return
     _held["seen"] = name
     for row in scene.beyond_mocap_passes.players:
+        # a player is clicked by character, mesh or place
         known = {row.body, row.place, *(row.body.children if row.body else ())}
         if active is not None and active in known and row.name != rally().holder:
             scene.beyond_mocap_stream.target = row.name
 
 
 def _over(why: str) -> None:
-    """The rally ends by itself."""
+    """End the rally with a message."""
     stop()
     told = bpy.context.window_manager.beyond_mocap_streaming
     told.playing, told.played = False, why
 
 
 def _tell(scene, piece: Piece | None = None) -> None:
+    """Write the state of the rally for the panel."""
     told, one = bpy.context.window_manager.beyond_mocap_streaming, rally()
     told.playing = True
     lines = [f"{one.holder} has the ball, passes so far: {one.passes}"]
@@ -221,9 +238,9 @@ def _tell(scene, piece: Piece | None = None) -> None:
 
 
 def _after_undo() -> None:
-    """What is undone is not what the rally knows any more."""
+    """End the rally after an undo, which changes the scene that the rally knows."""
     if rally() is not None:
-        _over("Undo has ended Play Live: press it to begin anew")
+        _over("Undo has ended Play Live: press it to start again")
 
 
 WATCHER = Watcher(name="Play Live", restored=_after_undo, closing=stop, ends=stop)

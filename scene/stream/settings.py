@@ -1,4 +1,4 @@
-"""Where a stream comes from and what is looked for in it; and, for the panel, how it does."""
+"""Settings of the live stream and, for the panel, its status."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ class BeyondMocapStream(bpy.types.PropertyGroup):
     attached_to = ("Scene.beyond_mocap_stream",)
 
     clip: StringProperty(name="Suit's BVH", subtype="FILE_PATH",
-                         description="A BVH file of the same suit, for streams that send numbers only; else empty")
+                         description="BVH file of the same suit, needed for streams that send numbers only")
     target: StringProperty(
         name="Target",
-        description="Who gets the next pass in Play Live; empty: the next one of the list. Keys 1 to 9, or click a "
-        "player",
+        description="Player who receives the next pass in Play Live, also chosen by keys 1 to 9 or a click; "
+        "leave empty for the next one in the list",
     )
     body: PointerProperty(name="Streamed Body", type=bpy.types.Object, poll=lambda _, thing: thing.type == "ARMATURE",
-                          description="The armature that does what the user does; made where it is missing")
+                          description="Armature that follows the user; created if empty")
 
 
 class BeyondMocapStreaming(bpy.types.PropertyGroup):
-    """How the stream does; of the session, in no file."""
+    """Status of the stream. It belongs to the session and is not saved."""
 
     attached_to = ("WindowManager.beyond_mocap_streaming",)
 
-    on: BoolProperty(description="Whether a stream is listened to")
+    on: BoolProperty(description="Whether a stream is being received")
     state: StringProperty(description="Waiting, receiving, stalled, ended, failed or stopped")
-    line: StringProperty(description="The same in a sentence")
-    figures: StringProperty(description="Lines 'name: value'")
-    hit: StringProperty(description="The last strike that was recognised")
-    playing: BoolProperty(description="Whether the passing scene is played live")
-    played: StringProperty(description="Lines about the rally that is played live")
+    line: StringProperty(description="State of the stream in a sentence")
+    figures: StringProperty(description="Figures of the stream")
+    hit: StringProperty(description="Last strike that was detected")
+    playing: BoolProperty(description="Whether the passing scene is being played live")
+    played: StringProperty(description="State of the rally that is being played live")

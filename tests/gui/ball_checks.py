@@ -224,7 +224,7 @@ def check_bounces_are_changed_and_nonsense_is_told():
     yield from settled()
     before = passes().made_of
     passes().passes[0].to = passes().passes[0].who
-    yield from until(lambda: "himself" in passes().told)
+    yield from until(lambda: "both passer and receiver" in passes().told)
     yield from settled()
     assert passes().made_of == before
     passes().passes[0].to = "Ben"

@@ -1,1 +1,1 @@
-"""Motion that arrives while it is made: BVH frames over the machine's own network, and the hits in them."""
+"""Motion that arrives live: BVH frames over this machine's own network, and the hits in them."""

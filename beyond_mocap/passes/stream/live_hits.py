@@ -1,7 +1,8 @@
-"""Hits recognised while frames arrive: the last seconds of a stream are analysed again and again (Ball handling §4).
+"""Hits detected while frames arrive: the last seconds of a stream are analysed again and again (Ball handling, section
+4).
 
-A hit motion is told once it is over, that is when the part has come to rest again: only then can its whole way be
-compared with others (eq. 2). It takes the seconds of the follow-through; the paper's user waits as long.
+A hit motion is reported when it is over, that is when the part is at rest again: only then can its whole movement be
+compared with others (eq. 2). This takes the seconds of the follow-through; the paper's user waits as long.
 """
 
 from __future__ import annotations
@@ -14,14 +15,22 @@ from ..hits import HitMotion, analyse
 from .listener import Arrived, Listener, poses
 
 WINDOW = 4.0
-"""Seconds that are looked at."""
-_RATE = 60.0
-_LEAST = 0.5
-_SETTLED = 0.05
+"""Seconds of the stream that are analysed."""
+_RATE = 60.0  # Hz: most frames per second that are analysed
+_LEAST = 0.5  # s of frames without which nothing is analysed
+_SETTLED = 0.05  # s by which a hit motion has to be over
 
 
 class LiveHits:
-    """Watches a listener for hits of a part. side: "left", "right", or "" for either. threshold: as in `analyse`."""
+    """Detects hits of a part in the frames of a listener.
+
+    Args:
+        listener: the listener.
+        part: "foot", "head", "chest", "hand", "tool", or a joint's name.
+        side: "left", "right", or "" for either.
+        threshold: as in `detect_hits`.
+        tool: what is in the hand.
+    """
 
     def __init__(self, listener: Listener, part: str = "foot", side: str = "", threshold: float | None = None,
                  tool: Tool | None = None):
@@ -32,8 +41,13 @@ class LiveHits:
         self._seen = 0
 
     def look(self) -> tuple[HitMotion, float] | None:
-        """The strongest hit motion that has ended since the last look, and the seconds (monotonic clock) of its key;
-        None where there is none. InputError for a part that the streamed body lacks."""
+        """Find the strongest hit motion that has ended since the last call.
+
+        Returns:
+            The hit motion and the time of its key (s, monotonic clock), or None.
+        Raises:
+            InputError: if the streamed body lacks the part.
+        """
         frames = self.listener.since(0)
         if not frames or frames[-1].number == self._seen:
             return None
@@ -51,25 +65,42 @@ class LiveHits:
         return best, float(times[best.key])
 
     def _hits(self, motion: Motion, side: str) -> list[HitMotion]:
-        """Hit motions that are whole: begun within the window and over by now."""
+        """Find the complete hit motions: begun within the window and already over."""
         settled = len(motion) - 1 - int(np.ceil(_SETTLED * motion.fps))
         found = analyse(motion, self.part, side, self.threshold, tool=self.tool).motions
         return [hit for hit in found if 0 < hit.first and hit.last < settled]
 
 
 def recorded(listener: Listener, seconds: float, rate: float | None = None) -> Motion | None:
-    """The last `seconds` of a stream as a motion; None where there is less than two frames. rate: no more frames a
-    second than this. Networks bring frames in bunches, so they are taken to be evenly apart from the first to the
-    last."""
+    """Build a motion from the last seconds of a stream.
+
+    Networks deliver frames in bursts, so the frames are spaced evenly from the first to the last.
+
+    Args:
+        listener: the listener.
+        seconds: how much of the stream.
+        rate: most frames per second; None: all.
+    Returns:
+        The motion, or None if there are fewer than two frames.
+    """
     frames = listener.since(0)
     frames = [frame for frame in frames if frame.time > frames[-1].time - seconds]
     return even(frames, rate)[0] if len(frames) > 1 and frames[-1].time > frames[0].time else None
 
 
 def even(frames: list[Arrived], rate: float | None = None) -> tuple[Motion, np.ndarray]:
-    """Frames that came in, two or more, as a motion, and the seconds (T,) of its frames; `rate` as above."""
+    """Build a motion with evenly spaced frames.
+
+    Args:
+        frames: two frames or more that have arrived.
+        rate: most frames per second; None: all.
+    Returns:
+        motion: the motion, T frames.
+        times: (T,) s of its frames, monotonic clock.
+    """
     seconds = frames[-1].time - frames[0].time
     step = 1 if rate is None else max(1, int(len(frames) / (seconds * rate)))
+    # every `step`-th frame, counted from the last one so that it is always kept
     frames = frames[::-1][::step][::-1]
     skeleton, root, rotations = poses(frames)
     seconds = max(frames[-1].time - frames[0].time, 1e-3)

@@ -1,4 +1,4 @@
-"""A recording sent as a suit would send it, for people without one: at its own rate, to this machine only."""
+"""Sender of a recording in a suit's format, for users without a suit: at its own rate, to this machine only."""
 
 from __future__ import annotations
 
@@ -16,16 +16,26 @@ from .listener import LOOPBACK
 
 FORMS = ("bvh", "neuron")
 WAYS = ("udp", "tcp", "serve")
-"""Datagrams; connecting to who listens; or waiting for who calls, as Axis Neuron does."""
-_HEADER_EVERY = 1.0
-_TICK = 0.2
+"""Send datagrams; connect to a listener; or wait for a listener to connect, as Axis Neuron does."""
+_HEADER_EVERY = 1.0  # s between two hierarchies over UDP
+_TICK = 0.2  # s: longest wait between two checks for a stop
 _AVATAR = "0 Avatar00 "
-_LARGEST_DATAGRAM = 60000
+_LARGEST_DATAGRAM = 60000  # bytes
 
 
 class Sender:
-    """Sends a BVH file. way: of WAYS. form: of FORMS. rate: frames a second (None: the file's).
-    loop: again and again."""
+    """Sends a BVH file.
+
+    Args:
+        path: the BVH file.
+        port: port of this machine.
+        connection: one of CONNECTIONS.
+        form: one of FORMS.
+        rate: frames per second; None: the file's.
+        loop: whether to repeat the file.
+    Raises:
+        InputError: for an unknown connection or form, a file that is no BVH file, or frames larger than a datagram.
+    """
 
     def __init__(self, path, port: int, way: str = "udp", form: str = "bvh", rate: float | None = None,
                  loop: bool = False):
@@ -38,11 +48,19 @@ class Sender:
         lead, end = (_AVATAR, " ||") if form == "neuron" else ("", "\n")
         self.rows = [lead + " ".join(f"{value:.4f}" for value in row) + end for row in text.values]
         if way == "udp" and max(len(self.header), len(self.rows[0])) > _LARGEST_DATAGRAM:
-            raise InputError(path, "a frame or hierarchy larger than a datagram", "60 kB", "send it with --tcp")
+            raise InputError(path, "a frame or hierarchy larger than a datagram", "60 kB at most", "send it over TCP")
 
     def run(self, stopped: Callable[[], bool], told: Callable[[int], None] = lambda frames: None) -> int:
-        """Send until the file's end (loop: until `stopped` says so); how many frames went out. told(frame) after each.
-        InputError where nobody listens."""
+        """Send until the end of the file, or with `loop` until stopped.
+
+        Args:
+            stopped: whether to stop.
+            report: receives the number of frames sent, after each frame.
+        Returns:
+            The number of frames sent.
+        Raises:
+            InputError: if there is no listener.
+        """
         out = self._connected(stopped)
         if out is None:
             return 0
@@ -50,6 +68,7 @@ class Sender:
             return self._send(out, stopped, told)
 
     def _connected(self, stopped: Callable[[], bool]) -> socket.socket | None:
+        """Open the socket; None if it was stopped before a listener connected."""
         if self.way == "udp":
             out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
             out.connect((LOOPBACK, self.port))
@@ -59,13 +78,13 @@ class Sender:
         try:
             return socket.create_connection((LOOPBACK, self.port), timeout=5.0)
         except OSError as error:
-            found = f"nobody listens ({error.strerror or error})"
+            found = f"no listener ({error.strerror or error})"
             raise InputError(f"port {self.port}", found, "a listener", "start the stream in Blender first") from None
 
     def _called(self, stopped: Callable[[], bool]) -> socket.socket | None:
-        """The connection of the first who calls; None where it was stopped before."""
+        """Wait for the first connection; None if it was stopped before."""
         with socket.socket(socket.AF_INET, socket.SOCK_STREAM) as server:
-            if os.name != "nt":  # there it lets two programs share a port
+            if os.name != "nt":  # on Windows it would let two programs share a port
                 server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 server.bind((LOOPBACK, self.port))
@@ -80,6 +99,7 @@ class Sender:
         return None
 
     def _send(self, out: socket.socket, stopped: Callable[[], bool], told) -> int:
+        """Send frames at their times."""
         begun, frame, header_due = time.monotonic(), 0, 0.0
         while not stopped() and (self.loop or frame < len(self.rows)):
             due = begun + frame * self.frame_time
@@ -98,7 +118,7 @@ class Sender:
         return frame
 
     def _put(self, out: socket.socket, text: str) -> bool:
-        """Whether it went out; a datagram that nobody takes is no trouble."""
+        """Send a text; True if it was sent, or if it is a datagram without a receiver."""
         try:
             out.sendall(text.encode())
             return True

@@ -1,1 +1,1 @@
-"""Recordings with known answers, for tests, benchmarks and the sample."""
+"""Synthetic recordings with ground truth, for tests, benchmarks and the sample."""

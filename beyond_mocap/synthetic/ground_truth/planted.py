@@ -1,9 +1,9 @@
-"""A made match of which every touch is known: for tests, for figures, and to see what a solver makes of a feed.
+"""A synthetic match in which every touch is known, for tests, figures, and to evaluate what a solver finds in a feed.
 
-Twenty-two players wander about their places in two formations. Somebody has the ball, drives it on or not, and plays
-it to another of his team, along the ground or through the air; the ball obeys `ball.flight`. Whoever takes it comes to
-where the ball is, with an opponent near him; opponents take some balls; some go out and are thrown in.
-`sample_feed` makes of it what a feed would deliver: samples with noise, stretches filled in, balls lost behind legs.
+Twenty-two players wander about their places in two formations. A player has the ball, dribbles or not, and plays it to
+a team-mate, along the ground or through the air; the ball follows `ball.flight`. The player who takes it comes to where
+the ball is, with an opponent nearby. Opponents take some balls; some go out and are thrown in. `sample_feed` turns the
+match into what a feed delivers: samples with noise, filled stretches, and balls put to a player.
 """
 
 from __future__ import annotations
@@ -19,16 +19,25 @@ from ...ball.physics import FOOTBALL, Ball, rolling_spin
 LENGTH, WIDTH = 105.0, 68.0
 TEAMS = ("home", "away")
 _ROWS = ((-47.0, (0.0,)), (-30.0, (-22.0, -8.0, 8.0, 22.0)), (-12.0, (-24.0, -8.0, 8.0, 24.0)), (4.0, (-10.0, 10.0)))
-_HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # metres of the ball's centre: above the first head, above the second chest
-_HOLD = 9.0  # seconds over which a player leaves his place for a ball and comes back
-_SLOW = 0.4  # seconds over which the ball's error hangs together
-_PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # the players' errors: seconds, metres; metres between samples
+_HIGH, _CHEST, _LOW = 1.35, 0.75, 2.45  # m of the ball's centre: head above, chest above, most
+_HOLD = 9.0  # s over which a player leaves their place for a ball and returns
+_SLOW = 0.4  # s, correlation time of the ball's error
+_PLAYERS_SLOW, _PLAYERS_NOISE, _JITTER = 2.0, 0.08, 0.01  # s, m; m from sample to sample
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PlantedTouch:
-    """Somebody changes the ball's course: time s, player (id), part ("foot", "chest", "head", "hand"), word ("kick",
-    "receive", "dribble", "header", "throw-in"); position (3,) m of the ball's centre, before and after (3,) m/s."""
+    """A touch that changes the ball's trajectory.
+
+    Attributes:
+        time: s.
+        player: id.
+        part: "foot", "chest", "head" or "hand".
+        label: "kick", "receive", "dribble", "header" or "throw-in".
+        position: (3,) m, the ball's centre.
+        before: (3,) m/s, the ball's velocity before the touch.
+        after: (3,) m/s, its velocity after the touch.
+    """
 
     time: float
     player: str
@@ -41,9 +50,18 @@ class PlantedTouch:
 
 @dataclass(eq=False)
 class PlantedMatch:
-    """What truly happened. ids: of the P players, teams' players one after the other. touches in order. flights: after
-    each touch the ball's way until the next. outs: (time, line) where the ball left the pitch, "touch" or "goal". held:
-    (from, until, place (3,)) where somebody holds it for a throw-in. seconds: how long it lasts."""
+    """Ground truth of a match.
+
+    Attributes:
+        seconds: length of the match.
+        ids: of the P players, one team after the other.
+        ball: the ball.
+        touches: in order of time.
+        flights: the ball's flight after each touch until the next.
+        outs: (time, line) where the ball left the pitch, line "touch" or "goal".
+        held: (from, until, place (3,)) where a player holds it for a throw-in.
+        places: places of the players.
+    """
 
     seconds: float
     ids: tuple[str, ...]
@@ -55,7 +73,7 @@ class PlantedMatch:
     places: "_Places" = None
 
     def ball_at(self, times: np.ndarray) -> np.ndarray:
-        """(N, 3) m: the ball's centre."""
+        """Compute the ball's centre (N, 3) m at `times` (N,) s."""
         starts = np.array([touch.time for touch in self.touches])
         which = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
         out = np.empty((len(times), 3))
@@ -66,24 +84,24 @@ class PlantedMatch:
         return out
 
     def players_at(self, times: np.ndarray) -> np.ndarray:
-        """(P, N, 2) m: the players' places."""
+        """Compute the players' places (P, N, 2) m at `times` (N,) s."""
         return np.stack([self.places.at(player, np.asarray(times, float)) for player in range(len(self.ids))])
 
     @property
     def bounces(self) -> np.ndarray:
-        """(K,) s: when the ball met the ground and left it again."""
+        """Times (K,) s at which the ball bounced on the ground."""
         ends = [*(touch.time for touch in self.touches[1:]), self.seconds]
         found = [flight.bounces[flight.bounces < end] for flight, end in zip(self.flights, ends)]
         return np.concatenate(found) if found else np.zeros(0)
 
 
 def planted_match(seconds: float = 120.0, seed: int = 0) -> PlantedMatch:
-    """A made match of `seconds`; the same seed makes the same one."""
+    """Build a match of `seconds`; the same seed gives the same match."""
     return _Play(seconds, seed).whole()
 
 
 class _Places:
-    """Where everybody is: a slow wander about his place, and the balls that he goes to."""
+    """Places of all players: a slow wander about each home place, and the balls that they go to."""
 
     def __init__(self, rng: np.random.Generator):
         rows = [(x, y) for x, ys in _ROWS for y in ys]
@@ -95,17 +113,17 @@ class _Places:
         self.ways: dict[int, Callable[[np.ndarray], np.ndarray]] = {}
 
     def wander(self, player: int, times: np.ndarray) -> np.ndarray:
-        """(N, 2) m without any ball."""
+        """Compute the places (N, 2) m of a player without any ball."""
         angle = 2.0 * np.pi * times[:, None] / self.period[player] + self.phase[player]
         return self.home[player] + self.wide[player] * np.sin(angle)
 
     def send(self, player: int, time: float, place: np.ndarray) -> None:
-        """He is at `place` (2,) at `time`; times of one player only grow."""
+        """Make a player be at `place` (2,) at `time`; times of one player only grow."""
         self.drawn[player].append((time, place - self.wander(player, np.array([time]))[0]))
         self.ways.pop(player, None)
 
     def stay(self, player: int, since: float) -> None:
-        """He has been where he was last sent to since then."""
+        """Let a player have been at their last place since `since`."""
         time, away = self.drawn[player][-1]
         wandered = self.wander(player, np.array([time, since]))
         earlier = [one for one in self.drawn[player][:-1] if one[0] < since]
@@ -113,13 +131,15 @@ class _Places:
         self.drawn[player] = [*earlier, (since, away + wandered[0] - wandered[1]), (time, away)]
 
     def at(self, player: int, times: np.ndarray) -> np.ndarray:
-        """(N, 2) m."""
+        """Compute the places (N, 2) m of a player."""
         if player not in self.ways:
             self.ways[player] = self._away(player)
         return self.wander(player, times) + self.ways[player](times)
 
     def _away(self, player: int) -> Callable[[np.ndarray], np.ndarray]:
-        """Metres from his wander: through all that he was sent to, smoothly, and back where there is time."""
+        """Build the offset in m from a player's wander: smoothly through all places they go to, and back where there is
+        time.
+        """
         from scipy.interpolate import PchipInterpolator
 
         knots: list[tuple[float, np.ndarray]] = [(-_HOLD, np.zeros(2))]
@@ -133,7 +153,7 @@ class _Places:
         return lambda times: smooth(np.clip(times, when[0], when[-1]))
 
     def ready(self, player: int, time: float, place: np.ndarray) -> bool:
-        """Whether he can be at `place` at `time` without running faster than a man."""
+        """Whether a player can be at `place` at `time` at a human running speed."""
         last = self.drawn[player][-1][0] if self.drawn[player] else -_HOLD
         here = self.at(player, np.array([min(last, time) if time - last < _HOLD else time]))[0]
         left = max(time - last, 0.05) if time - last < _HOLD else _HOLD
@@ -141,7 +161,7 @@ class _Places:
 
 
 class _Play:
-    """The match as it is made, touch by touch."""
+    """Builds a match, touch by touch."""
 
     def __init__(self, seconds: float, seed: int):
         self.rng = np.random.default_rng(seed)
@@ -160,7 +180,7 @@ class _Play:
         return self.match
 
     def _meet(self, word: str, part: str) -> None:
-        """The holder comes to the ball."""
+        """Move the holder to the ball."""
         self.word, self.part = word, part
         reach = self.rng.uniform(0.1, 0.3) if part in ("head", "chest") else self.rng.uniform(0.2, 0.6)
         angle = self.rng.uniform(0.0, 2.0 * np.pi)
@@ -170,7 +190,7 @@ class _Play:
             self._press(place)
 
     def _press(self, place: np.ndarray) -> None:
-        """An opponent comes near."""
+        """Move an opponent near."""
         others = [p for p in range(22) if p // 11 != self.holder // 11 and self._free(p)]
         away = [np.linalg.norm(self.places.at(p, np.array([self.time]))[0] - place) for p in others]
         if others and min(away) < 12.0:
@@ -186,7 +206,7 @@ class _Play:
         return fly(Launch(self.time, self.position, velocity, spin), self.match.ball, seconds)
 
     def _play(self, flight: Flight, time: float) -> None:
-        """The touch is made: the ball leaves, and goes on until `time`."""
+        """Add the touch: the ball leaves, and continues until `time`."""
         velocity, who = np.array(flight.launch.velocity), self.match.ids[self.holder]
         self.match.touches.append(
             PlantedTouch(time=self.time, player=who, part=self.part, word=self.word, position=self.position.copy(),
@@ -197,19 +217,19 @@ class _Play:
         self.position, self.before = flight.at([time])[0], flight.velocity([time])[0]
 
     def _along(self, speed: float, angle: float) -> Flight:
-        """Along the ground, turning as it rolls or less."""
+        """Simulate a ball along the ground with a share of its rolling spin."""
         velocity = speed * np.array([np.cos(angle), np.sin(angle), 0.0])
         return self._flight(velocity, self.rng.uniform(0.2, 1.0) * rolling_spin(velocity, self.match.ball), 4.0)
 
     def _drive(self) -> None:
-        """One more touch by the holder: the ball rolls on, and he runs after it."""
+        """Add one more touch by the holder: the ball rolls on, and they run after it."""
         angle = self.rng.uniform(-0.8, 0.8) + np.arctan2(*-self.position[1::-1])
         self.word = "dribble" if self.word == "kick" else self.word
         self._play(self._along(self.rng.uniform(2.0, 6.5), angle), self.time + self.rng.uniform(0.45, 1.4))
         self._meet("dribble", "foot")
 
     def _pass(self) -> None:
-        """The ball to somebody: the first of some tries that a man can meet."""
+        """Play the ball to another player: the first of some tries that a player can meet."""
         others = np.array([p for p in range(22) if p != self.holder])
         here = np.array([self.places.at(p, np.array([self.time + 1.0]))[0] for p in others])
         away = np.linalg.norm(here - self.position[:2], axis=1)
@@ -224,7 +244,7 @@ class _Play:
         return self._out()
 
     def _tried(self, other: int, way: np.ndarray) -> tuple[Flight, float] | None:
-        """A ball played `way` (2,) m to `other`, and when he can take it; None where he cannot."""
+        """Try a ball played `to_target` (2,) m to `other`; the flight and when they can take it, or None."""
         far, angle = float(np.linalg.norm(way)), np.arctan2(way[1], way[0])
         across = way / far
         if self.rng.random() < min(0.25 + far / 60.0, 0.8):
@@ -246,7 +266,7 @@ class _Play:
         return None
 
     def _arrive(self, other: int) -> None:
-        """`other` takes the ball: he stops it, or plays on at once."""
+        """Let `other` take the ball: they stop it, or play on at once."""
         self.holder = other
         height = self.position[2]
         part = "head" if height > _HIGH else "chest" if height > _CHEST else "foot"
@@ -259,7 +279,7 @@ class _Play:
             self._meet("kick", "foot")
 
     def _out(self) -> None:
-        """Over the touch line; then a throw-in."""
+        """Play the ball over the touch line, followed by a throw-in."""
         side = 1.0 if self.position[1] >= 0.0 else -1.0
         left = WIDTH / 2 + 2.0 - side * self.position[1]
         flight = self._flight(np.array([2.0, side * (12.0 + 0.3 * left), 3.0]), np.zeros(3), 12.0)
@@ -283,8 +303,20 @@ class _Play:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Feed:
-    """N samples. times (N,) s. ball (N, 3) m, z NaN where there are no heights. positions (P, N, 2) m of players `ids`
-    in `teams`. filled, wrong (N,) bool: made at constant velocity, put elsewhere. length, width of the pitch, m."""
+    """N samples of a feed.
+
+    Attributes:
+        times: (N,) s.
+        ball: (N, 3) m, z NaN if there are no heights.
+        positions: (P, N, 2) m of the players.
+        ids: of the players.
+        teams: of the players.
+        filled: (N,) bool, samples on straight lines at constant velocity.
+        wrong: (N,) bool, samples put elsewhere.
+        fps: Hz.
+        length: of the pitch, m.
+        width: of the pitch, m.
+    """
 
     times: np.ndarray
     ball: np.ndarray
@@ -302,11 +334,19 @@ def sample_feed(
     match: PlantedMatch, fps: float = 25.0, noise: float = 0.08, heights: bool = True, filled: float = 0.0,
     snaps: float = 0.1, seed: int = 0,
 ) -> Feed:  # fmt: skip
-    """A feed of `match` at `fps` Hz.
+    """Sample a match as a feed.
 
-    noise: m, standard deviation of each of the ball's coordinates, half of it from sample to sample. filled: share of
-    samples that lie on straight lines between the touches instead. snaps: share of touches at which the ball is put to
-    the player for a fifth of a second."""
+    Args:
+        match: the match.
+        fps: Hz.
+        noise: m, standard deviation of each of the ball's coordinates, half of it from sample to sample.
+        heights: whether the ball has heights.
+        filled: share of samples that are replaced by straight lines between the touches.
+        snaps: share of touches at which the ball is put to the player for a fifth of a second.
+        seed: of the errors.
+    Returns:
+        The feed.
+    """
     rng = np.random.default_rng(seed)
     times = np.arange(int(match.seconds * fps)) / fps
     ball = match.ball_at(times) - np.array([0.0, 0.0, match.ball.radius])
@@ -323,7 +363,7 @@ def sample_feed(
 
 
 def _slow_noise(rng, shape, samples: float, size: float, axis: int = 0) -> np.ndarray:
-    """Noise of standard deviation `size` that hangs together over `samples` along an axis."""
+    """Build noise of standard deviation `size` that is correlated over `samples` along an axis."""
     from scipy.signal import lfilter
 
     keep = np.exp(-1.0 / samples)
@@ -333,7 +373,7 @@ def _slow_noise(rng, shape, samples: float, size: float, axis: int = 0) -> np.nd
 
 
 def _snapped(match, times, measured, players, share: float, rng) -> np.ndarray:
-    """Puts the ball to the player at some touches, in place; (N,) bool where."""
+    """Put the ball to the player at some touches, in place; returns (N,) bool where."""
     wrong = np.zeros(len(times), bool)
     for touch in match.touches:
         if rng.random() < share:
@@ -344,7 +384,7 @@ def _snapped(match, times, measured, players, share: float, rng) -> np.ndarray:
 
 
 def _filled(match, times, measured, ball, share: float, rng) -> np.ndarray:
-    """Draws straight lines between the touches of some stretches, in place; (N,) bool where."""
+    """Replace some stretches by straight lines between the touches, in place; returns (N,) bool where."""
     made = np.zeros(len(times), bool)
     touches = np.array([touch.time for touch in match.touches])
     while made.mean() < share:

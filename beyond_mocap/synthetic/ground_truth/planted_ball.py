@@ -1,7 +1,7 @@
-"""A ball planted in a hand: held, released and flying, with one marker that turns with it, all of it known.
+"""A synthetic ball in a hand: held, released and flying, with one marker that turns with it, as ground truth.
 
-Until release the ball goes with the hand; then its centre flies on with the velocity it had (no air unless asked for)
-and the ball turns at a steady rate, as in Fredriksson §6.3 eq. 6.2-6.3.
+Until release the ball moves with the hand. Then its centre flies on with its last velocity (without air by default) and
+the ball turns at a steady rate, as in Fredriksson, section 6.3, eq. 6.2-6.3.
 """
 
 from __future__ import annotations
@@ -17,18 +17,25 @@ from ...motion.motion import Motion, forward_kinematics
 from .planted_body import adult_share
 
 GRAVITY = 9.81  # m/s^2
-_GRIP = (0.012, 0.105, -0.036)  # of a left hand in a T-pose: between the fingers, on the palm's side
-_MARKER = (0.25, 0.15, -0.95)  # where the marker sits on a held ball, as seen from its centre
-_FINE = 1e-3  # s between places from which the velocity at release is read, and steps through air
+_GRIP = (0.012, 0.105, -0.036)  # m, of a left hand in a T-pose: between the fingers, on the palm's side
+_MARKER = (0.25, 0.15, -0.95)  # direction of the marker from the centre of a held ball
+_FINE = 1e-3  # s, step of flights with air drag
 
 
 @dataclass(frozen=True)
 class PlantedBall:
-    """What is asked for.
+    """Request for a synthetic ball.
 
-    release: seconds at which the ball leaves the hand. side: "Left" or "Right". radius: metres. turns: revolutions a
-    second in flight. seen: seconds of flight after which no camera sees it. drag: 1/m, see `ball.physics`. label: the
-    marker's. grip: (3,) metres, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it."""
+    Attributes:
+        release: s at which the ball leaves the hand.
+        side: "Left" or "Right".
+        radius: m.
+        spin_rate: revolutions per second in flight.
+        seconds_seen: s of flight after which no camera sees it.
+        drag: 1/m, see `ball.physics`.
+        label: of the marker.
+        grip: (3,) m, the ball's centre in the hand's axes of a T-pose; None: as a hand holds it.
+    """
 
     release: float
     side: str = "Right"
@@ -42,10 +49,17 @@ class PlantedBall:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class BallTruth:
-    """What came out: places (T, 3) metres of the ball's centre and marker (T, 3) of the marker, without noise.
+    """Ground truth of a synthetic ball, without noise.
 
-    position, velocity: (3,) m and m/s of the centre at release. spin: (3,) radians a second in flight. grip: (3,)
-    metres in the hand's axes. asked: the ball that was planted."""
+    Attributes:
+        request: the request.
+        places: (T, 3) m, the ball's centre.
+        marker: (T, 3) m, the marker.
+        position: (3,) m, the centre at release.
+        velocity: (3,) m/s of the centre at release.
+        spin: (3,) rad/s in flight.
+        grip: (3,) m, the centre in the hand's axes.
+    """
 
     asked: PlantedBall
     places: np.ndarray
@@ -57,17 +71,26 @@ class BallTruth:
 
     @property
     def speed(self) -> float:
-        """Metres a second at release."""
+        """Speed at release, m/s."""
         return float(np.linalg.norm(self.velocity))
 
 
 def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
-    """The ball of a motion in marker axes (`planted_body`). InputError without that hand, or a release outside."""
+    """Build the ball of a motion in marker axes.
+
+    Args:
+        truth: the motion, as `to_marker_axes` gives it.
+        request: the request.
+    Returns:
+        The ball's ground truth.
+    Raises:
+        InputError: if the body has no such hand, or the release is outside the motion.
+    """
     name = asked.side + "Hand"
     if name not in truth.skeleton.names:
-        raise InputError("planted ball", f"no joint {name}", "a body with that hand", "give the other side")
+        raise InputError("synthetic ball", f"no joint {name}", "a body with that hand", "choose the other side")
     if not 0.0 < asked.release < truth.duration:
-        raise InputError("planted ball", f"release at {asked.release:g} s", f"within 0 to {truth.duration:g} s")
+        raise InputError("synthetic ball", f"release at {asked.release:g} s", f"within 0 to {truth.duration:g} s")
     hand = truth.skeleton.index(name)
     mirrored = np.array([1.0, 1.0 if asked.side == "Left" else -1.0, 1.0])
     grip = np.array(asked.grip) if asked.grip is not None else _GRIP * mirrored * adult_share(truth.skeleton)
@@ -89,7 +112,7 @@ def planted_ball(truth: Motion, asked: PlantedBall) -> BallTruth:
 
 
 def _at_release(times, held, turns, release: float):
-    """Place (3,), velocity (3,) and the hand's turn (4,) at release, between the frames."""
+    """Interpolate place (3,), velocity (3,) and the hand's rotation (4,) at release, between the frames."""
     from scipy.interpolate import CubicSpline
 
     path = CubicSpline(times, held, axis=0)
@@ -99,13 +122,14 @@ def _at_release(times, held, turns, release: float):
 
 
 def _backspin(velocity: np.ndarray) -> np.ndarray:
-    """The level axis (3,) about which a ball of this velocity turns backwards; any where it goes straight up."""
+    """Compute the level axis (3,) about which a ball of this velocity has backspin; any axis if it flies straight up.
+    """
     across = np.cross([0.0, 0.0, 1.0], velocity)
     return -across / np.linalg.norm(across) if np.linalg.norm(across) > 1e-6 else np.array([0.0, 1.0, 0.0])
 
 
 def _flight(position: np.ndarray, velocity: np.ndarray, after: np.ndarray, drag: float) -> np.ndarray:
-    """Places (T, 3) metres of the centre `after` (T,) seconds of flight."""
+    """Compute the places (T, 3) m of the centre `after` (T,) seconds of flight."""
     fall = np.array([0.0, 0.0, -GRAVITY])
     if drag == 0.0:
         return position + after[:, None] * velocity + 0.5 * after[:, None] ** 2 * fall

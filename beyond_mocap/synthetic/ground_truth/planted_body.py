@@ -1,9 +1,10 @@
-"""A recorded body in the axes of a marker model: the truth that planted markers are put on.
+"""A recorded body in the axes of a marker model: the ground truth for synthetic markers.
 
-Rigs rest in all kinds of poses and turn about all kinds of axes. Here any humanoid's motion is written on a skeleton
-whose joints, at rest, have the world's axes (X forward, Y left, Z up) in a T-pose: thumbs forward, palms down, knees
-and elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The turn of a
-hand about its forearm is the forearm's, as radius and ulna do it. Joints keep their places but for those of no meaning.
+Rigs have all kinds of rest poses and joint axes. Here the motion of any humanoid is converted to a skeleton whose
+joints, at rest, have the world's axes (X forward, Y left, Z up) in a T-pose: thumbs forward, palms down, knees and
+elbows turning about the body's own axes (`motion.retargeting.anatomy` finds them in the recording). The rotation of a
+hand about its forearm becomes the forearm's, as radius and ulna do it. Joints keep their places; joints without a known
+role are left out.
 """
 
 from __future__ import annotations
@@ -23,15 +24,21 @@ _PARTS = {
     "upper_leg": "UpLeg", "lower_leg": "Leg", "foot": "Foot", "toe": "ToeBase",
 }
 _ARM = ("upper_arm", "lower_arm", "hand")
-# tips of an adult whose leg (hip to ankle) is `_LEG` metres long: left side
+# m: tips of an adult whose leg (hip to ankle) is `_LEG` metres long, left side
 _LEG = 0.873
 _TIPS = {"Head": (0.01, 0.0, 0.19), "Hand": (0.0, 0.18, 0.0), "ToeBase": (0.07, 0.0, -0.005)}
 
 
 def in_marker_axes(motion: Motion) -> Motion:
-    """`motion` on a skeleton in the axes of marker models, joints named as there; InputError where no legs are found.
+    """Convert a motion to a skeleton in the axes of marker models.
 
-    Root positions metres, world, Z up; joints that mean nothing (fingers, a rig's helpers) are left out."""
+    Args:
+        motion: of any humanoid; root positions in m, world, Z up.
+    Returns:
+        The motion, joints named as in marker models, without fingers and a rig's helper joints.
+    Raises:
+        InputError: if the body has no legs.
+    """
     body = identify_posed(motion)
     anatomy = study(motion.skeleton, body, motion)
     places, world = forward_kinematics(motion)
@@ -43,7 +50,7 @@ def in_marker_axes(motion: Motion) -> Motion:
 
 
 def _named(skeleton: Skeleton, anatomy: Anatomy) -> dict[str, int]:
-    """Names of the marker models -> joints, parents first."""
+    """Find the joints of marker models: name -> joint, parents first."""
     body = anatomy.body
     found: dict[str, int] = {"Hips": body.hips}
     spine = list(body.spine)
@@ -58,7 +65,7 @@ def _named(skeleton: Skeleton, anatomy: Anatomy) -> dict[str, int]:
 
 
 def _segment(name: str, world: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """World turn (T, 4) of a segment in T-pose axes; anatomy's axes are those of hanging arms."""
+    """Compute the world rotation (T, 4) of a segment in T-pose axes; the anatomy's axes are those of hanging arms."""
     turn = quaternion.multiply(world, axes)
     if name.endswith(("Arm", "Hand")):
         sign = 1.0 if name.startswith("Left") else -1.0
@@ -67,7 +74,7 @@ def _segment(name: str, world: np.ndarray, axes: np.ndarray) -> np.ndarray:
 
 
 def _forearm_turns_hand(turns: dict[str, np.ndarray], side: str) -> None:
-    """Gives the forearm the hand's turn about its length, so that the wrist bends but does not twist."""
+    """Move the hand's rotation about its length to the forearm, so that the wrist bends but does not twist."""
     if side + "Hand" not in turns:
         return
     forearm, hand = turns[side + "ForeArm"], turns[side + "Hand"]
@@ -77,7 +84,14 @@ def _forearm_turns_hand(turns: dict[str, np.ndarray], side: str) -> None:
 
 
 def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: dict, leg: float) -> Motion:
-    """The motion on its new skeleton: places (T, J, 3) of the old joints, turns: name -> (T, 4) in the world."""
+    """Build the motion on its new skeleton.
+
+    Args:
+        named: name -> old joint.
+        places: (T, J, 3) m of the old joints, world.
+        rotations: name -> (T, 4) world rotations.
+        leg: length of a leg, m.
+    """
     names = list(named)
     parents = [_parent(name, names) for name in names]
     world = np.stack([turns[name] for name in names], axis=1)
@@ -94,7 +108,7 @@ def _written(named: dict[str, int], motion: Motion, places: np.ndarray, turns: d
 
 
 def _tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) -> np.ndarray:
-    """The end of a head, hand or toe (3,): the rig's own or, where it has none, a usual one."""
+    """Find the end of a head, hand or toe (3,): the rig's own, or an average one."""
     skeleton = motion.skeleton
     if joint in skeleton.end_parents and not skeleton.children(joint):
         offset = skeleton.end_offsets[skeleton.end_parents.index(joint)]
@@ -107,7 +121,7 @@ def _tip(name: str, motion: Motion, joint: int, turn: np.ndarray, leg: float) ->
 
 
 def _parent(name: str, names: list[str]) -> int:
-    """The nearest joint above `name` that the body has."""
+    """Find the nearest joint above `name` that the body has; -1 for none."""
     for above in _above(name):
         if above in names:
             return names.index(above)
@@ -115,7 +129,7 @@ def _parent(name: str, names: list[str]) -> int:
 
 
 def _above(name: str) -> list[str]:
-    """Joints that may carry `name`, nearest first."""
+    """List the joints that can carry `name`, nearest first."""
     trunk = ["Chest", "Spine4", "Spine3", "Spine2", "Spine1", "Spine", "Hips"]
     neck = ["Head", "Neck3", "Neck2", "Neck1", "Neck", *trunk]
     for chain in (neck, trunk):
@@ -128,15 +142,22 @@ def _above(name: str) -> list[str]:
 
 
 def adult_share(skeleton: Skeleton) -> float:
-    """How large the body is against an adult of 1.80 m: by its legs."""
+    """Compute the body's size over that of an adult of 1.80 m, by its legs."""
     bones = [skeleton.offsets[skeleton.index(side + part)] for side in ("Left", "Right") for part in ("Leg", "Foot")]
     return float(np.linalg.norm(bones, axis=1).sum() / 2.0 / _LEG)
 
 
 def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) -> Motion:
-    """Somebody who stands still for a static trial: arms lifted 45 degrees, elbows bent a little, swaying a little.
+    """Build a static trial: standing still with arms lifted by 45 degrees, elbows slightly bent, swaying a little.
 
-    skeleton: one of `in_marker_axes`. The feet stand at z = 0, the body faces +X."""
+    Args:
+        skeleton: as `to_marker_axes` gives it.
+        seconds: s.
+        fps: frames per second.
+        seed: of the sway.
+    Returns:
+        The motion; the feet are at z = 0, the body faces +X.
+    """
     rng = np.random.default_rng(seed)
     count = max(int(round(seconds * fps)), 2)
     times = np.arange(count) / fps
@@ -152,7 +173,7 @@ def calibration_pose(skeleton: Skeleton, seconds: float, fps: float, seed: int) 
 
 
 def _held(name: str) -> np.ndarray:
-    """How a joint is turned in the calibration pose: (4,)."""
+    """Rotation (4,) of a joint in the calibration pose."""
     sign = 1.0 if name.startswith("Left") else -1.0
     if name.endswith("ForeArm"):
         return quaternion.about_axis(_Z, -sign * np.radians(20.0))
@@ -162,7 +183,7 @@ def _held(name: str) -> np.ndarray:
 
 
 def _sway(times: np.ndarray, rng: np.random.Generator, size: float, columns: int) -> np.ndarray:
-    """Slow, smooth unrest (T, columns) of about `size`."""
+    """Build a slow, smooth random movement (T, columns) of about `size`."""
     rates, phases = rng.uniform(0.2, 0.9, (2, columns)), rng.uniform(0.0, 2.0 * np.pi, (2, columns))
     waves = np.sin(2.0 * np.pi * times[:, None, None] * rates + phases)
     return size * (waves - waves[:1]).sum(axis=1) * 0.6

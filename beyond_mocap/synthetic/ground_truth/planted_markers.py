@@ -1,17 +1,17 @@
-"""Markers planted on a known motion: a trial whose answer is known, for tests, benchmarks and the samples.
+"""Synthetic markers on a known motion: a trial with ground truth, for tests, benchmarks and the samples.
 
-    clip = bvh.read("walk.bvh").motion
-    known = planted(clip, "plug_in_gait", seed=1, occlusion=0.05)
-    known.trial, known.static      what a laboratory would hand over
-    known.motion, known.centres    what is to be found again
-    planted_error(known, found)    how far a reconstruction is from it
+    clip = bvh.read_bvh("walk.bvh").motion
+    known = build_trial(clip, "plug_in_gait", seed=1, occlusion=0.05)
+    known.trial, known.static             what a laboratory delivers
+    known.motion, known.centres           what a reconstruction has to find
+    measure_trial_error(known, found)     how far a reconstruction is from it
 
-`Faults` is what goes wrong while markers are recorded: hidden markers, exchanged labels, stray samples, lost labels.
-Errors of a reconstruction: of centres, the distance of the joints that anatomy defines (hips, knees, ankles, shoulders,
-elbows, wrists), frame by frame, as they lie in the world; of angles, each segment against the one above it, two ways:
-`raw` compares the segments' axes as they are; `angles` first takes off, from each segment, the one constant turn
-between found and true axes that fits the whole clip best: where a model draws a segment's axes is its convention, how
-the segment moves is not. Errors are the whole angle between found and true joint rotation, all three axes at once.
+`Faults` are errors of recordings: hidden markers, exchanged labels, stray samples, lost labels. Errors of a
+reconstruction are measured per frame. Of centres: the distance of the joints that anatomy defines (hips, knees, ankles,
+shoulders, elbows, wrists) in the world. Of angles, each segment against the one above it: `raw` compares the segments'
+axes as they are; `angles` first removes from each segment the constant rotation between found and true axes that fits
+the whole clip best, because the axes of a model's segment are a convention and its movement is not. Errors are the
+whole angle between found and true joint rotation, all three axes at once.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from .planted_body import calibration_pose, in_marker_axes
 from .planted_places import SETS, STATIC_ONLY, Placed, on_skin, placed
 
 _STATIC_SECONDS, _STATIC_FPS = 3.0, 100.0
-_SHORTEST, _USUAL, _LONGEST = 0.03, 0.15, 1.0  # seconds that a marker stays hidden
-_SWAPPED = (0.15, 0.7)  # seconds that two labels stay exchanged
-_STRAY = (0.02, 0.12)  # metres by which a stray sample is off
-_TRIES = 400
+_SHORTEST, _USUAL, _LONGEST = 0.03, 0.15, 1.0  # s that a marker stays hidden: least, median, most
+_SWAPPED = (0.15, 0.7)  # s that two labels stay exchanged: least, most
+_STRAY = (0.02, 0.12)  # m by which a stray sample is off: least, most
+_TRIES = 400  # attempts to find a free stretch for a fault
 _PARTS = ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand")
 CENTRES = tuple(side + part for side in ("Left", "Right") for part in _PARTS)
 ABOVE = {
@@ -44,18 +44,24 @@ ABOVE = {
        for part, above in (("UpLeg", "Hips"), ("Leg", "UpLeg"), ("Foot", "Leg"), ("Arm", "Chest"), ("ForeArm", "Arm"),
                            ("Hand", "ForeArm"))},
 }  # fmt: skip
-"""Joint -> the segment against which its angle counts: the trunk as one, from pelvis to chest."""
+"""Joint -> the segment against which its angle is measured: the trunk as one, from pelvis to chest."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Planted:
-    """A trial and its truth.
+    """A trial and its ground truth.
 
-    trial, static: as recorded, the static one of the same body with the same markers. motion: the true motion, joints
-    named and turned as in marker models (`planted_body`). centres: (T, J, 3) metres, its joints. pose: the true motion
-    of the static trial. markers: where they lie on the bones. clean: (T, M, 3) metres, where the trial's markers truly
-    were, skin and noise in them but no faults. faults: what was done to the trial. ball: where one was asked for, the
-    ball in the hand and in flight; its marker stands last among the trial's named ones."""
+    Attributes:
+        trial: the trial as recorded.
+        static: static trial of the same body with the same markers.
+        motion: the true motion, joints named and oriented as in marker models.
+        centres: (T, J, 3) m, its joints, world.
+        static_motion: the true motion of the static trial.
+        markers: places of the markers on the bones.
+        clean: (T, M, 3) m, true places of the trial's markers: with skin and noise, without faults.
+        faults: the faults of the trial.
+        ball: the ball in the hand and in flight, if requested; its marker is the last of the trial's named ones.
+    """
 
     trial: MarkerTrial
     static: MarkerTrial
@@ -68,12 +74,12 @@ class Planted:
     ball: BallTruth | None = None
 
     def centre(self, joint: str) -> np.ndarray:
-        """Where a joint truly is: (T, 3) metres."""
+        """True place (T, 3) m of a joint."""
         return self.centres[:, self.motion.skeleton.index(joint)]
 
     @property
     def segments(self) -> dict[str, str]:
-        """Which joint carries each marker."""
+        """Joint that carries each marker, by label."""
         names = self.motion.skeleton.names
         return {label: names[joint] for label, joint in zip(self.markers.labels, self.markers.joint)}
 
@@ -83,12 +89,22 @@ def planted(
     softness: float = 1.0, occlusion: float = 0.0, swaps: int = 0, jumps: int = 0, unlabeled: int = 0,
     ball: PlantedBall | None = None,
 ) -> Planted:
-    """Markers on any humanoid `motion`, and a static trial of the same body.
+    """Build markers on any humanoid motion, and a static trial of the same body.
 
-    marker_set: one of `planted_places.SETS`, or labels. noise: metres of the cameras' scatter in each coordinate (sd).
-    softness: factor on what skin does (1: 10 to 15 mm on a moving thigh, 0: markers on bone). occlusion: share of the
-    samples that are hidden. swaps, jumps, unlabeled: how many of each. ball: one in a hand, thrown. InputError for an
-    unknown set, or a body without legs."""
+    Args:
+        motion: the motion.
+        marker_set: one of `SETS`, or labels.
+        seed: of places, skin, noise and faults.
+        noise: m, standard deviation of the cameras' noise in each coordinate.
+        softness: factor on the skin's movement (1: 10 to 15 mm on a moving thigh, 0: markers on bone).
+        occlusion: share of the samples that are hidden.
+        swaps, jumps, unlabeled: number of each fault.
+        ball: a ball in a hand, thrown.
+    Returns:
+        The trial and its ground truth.
+    Raises:
+        InputError: for an unknown set, or a body without legs.
+    """
     truth = in_marker_axes(motion)
     labels = _labels(marker_set)
     markers = placed(truth.skeleton, labels, seed)
@@ -118,7 +134,7 @@ def planted(
 
 
 def _seen_ball(ball: BallTruth, truth: Motion, noise: float, rng: np.random.Generator) -> np.ndarray:
-    """The ball's marker as cameras see it: (T, 1, 3) metres, NaN once it is out of their sight."""
+    """Build the ball's marker as cameras see it: (T, 1, 3) m, NaN once it is out of sight."""
     seen = ball.marker + rng.normal(0.0, noise, ball.marker.shape)
     gone = np.arange(len(truth)) / truth.fps > ball.asked.release + ball.asked.seen
     return np.where(gone[:, None], np.nan, seen)[:, None]
@@ -128,12 +144,13 @@ def _labels(marker_set: str | tuple[str, ...]) -> tuple[str, ...]:
     if not isinstance(marker_set, str):
         return tuple(marker_set)
     if marker_set not in SETS:
-        raise InputError("planted markers", f"marker set {marker_set!r}", f"one of {', '.join(SETS)}, or labels")
+        raise InputError("synthetic markers", f"marker set {marker_set!r}", f"one of {', '.join(SETS)}, or labels")
     return SETS[marker_set]
 
 
 def _exchangeable(markers: Placed, labels: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Pairs that recordings confuse: two of one segment, or the same marker on the left and on the right."""
+    """List pairs that recordings confuse: two markers of one segment, or the same marker on the left and on the right.
+    """
     joint = dict(zip(markers.labels, markers.joint))
     labels = tuple(label for label in labels if label in joint)
     pairs = [two for two in combinations(labels, 2) if joint[two[0]] == joint[two[1]]]
@@ -143,8 +160,14 @@ def _exchangeable(markers: Placed, labels: tuple[str, ...]) -> list[tuple[str, s
 
 @dataclass(frozen=True)
 class Fault:
-    """One thing that was done to a trial. kind: "gap", "swap", "jump" or "unlabeled". labels: the marker, or the two
-    that are exchanged, or the marker and the label under which it goes on. frames start .. stop-1."""
+    """One fault of a trial.
+
+    Attributes:
+        kind: "gap", "swap", "jump" or "unlabeled".
+        labels: the marker, the two that are exchanged, or the marker and the label under which it continues.
+        start: first frame.
+        stop: frame after the last one.
+    """
 
     kind: str
     labels: tuple[str, ...]
@@ -153,7 +176,7 @@ class Fault:
 
 
 class Faults:
-    """A trial on which faults are laid, never two on one sample."""
+    """A trial to which faults are added, never two on one sample."""
 
     def __init__(self, trial: MarkerTrial, seed: int):
         self.trial = trial
@@ -164,9 +187,11 @@ class Faults:
         self.done: list[Fault] = []
 
     def occlude(self, share: float) -> None:
-        """Hides markers for stretches until `share` of all samples is gone; never more than half of them at once."""
+        """Hide markers for stretches until `share` of all samples is hidden; never more than half of the markers at
+        once.
+        """
         if not 0.0 <= share < 0.5:
-            raise InputError("planted markers", f"{share:g} of the samples hidden", "0 up to 0.5")
+            raise InputError("synthetic markers", f"{share:g} of the samples hidden", "0 or more, below 0.5")
         wanted = int(share * self.free.size)
         for _ in range(_TRIES * self.free.shape[1]):
             if wanted <= 0:
@@ -181,7 +206,7 @@ class Faults:
                 self._mark("gap", (marker,), start, stop)
 
     def swap(self, pairs: list[tuple[str, str]], count: int) -> None:
-        """Exchanges the labels of `count` pairs for a stretch each."""
+        """Exchange the labels of `count` pairs for a stretch each."""
         for _ in range(_TRIES):
             if count <= 0 or not pairs:
                 return
@@ -193,7 +218,7 @@ class Faults:
                 self._mark("swap", two, start, stop)
 
     def stray(self, count: int) -> None:
-        """Throws single samples off by some centimetres."""
+        """Move `count` single samples by some centimetres."""
         for _ in range(_TRIES):
             if count <= 0:
                 return
@@ -205,7 +230,7 @@ class Faults:
                 self._mark("jump", (marker,), frame, frame + 1)
 
     def unlabel(self, count: int) -> None:
-        """Lets `count` stretches go on as `*1`, `*2` ... while the marker's own label sees nothing."""
+        """Continue `count` stretches as `*1`, `*2` ... while the marker's own label is empty."""
         number = 0
         for _ in range(_TRIES):
             if number >= count:
@@ -222,19 +247,19 @@ class Faults:
                 self._mark("unlabeled", (marker, len(self.labels) - 1), start, stop)
 
     def faulty(self) -> tuple[MarkerTrial, tuple[Fault, ...]]:
-        """The trial as it came out, and what was done to it in the order of time."""
+        """Return the trial with its faults, and the faults in order of time."""
         trial = MarkerTrial(labels=tuple(self.labels), positions=self.positions, fps=self.trial.fps,
                             start=self.trial.start, name=self.trial.name, subject=self.trial.subject)
         return trial, tuple(sorted(self.done, key=lambda fault: (fault.start, fault.labels)))
 
     def _stretch(self, seconds: float) -> tuple[int, int]:
-        """Frames of a stretch somewhere in the trial, not at its very ends."""
+        """Choose the frames of a stretch in the trial, not at its very ends."""
         length = min(max(int(round(seconds * self.trial.fps)), 1), max(len(self.positions) // 3, 1))
         start = int(self.rng.integers(1, max(len(self.positions) - length, 2)))
         return start, min(start + length, len(self.positions))
 
     def _mark(self, kind: str, markers, start: int, stop: int) -> None:
-        """Keeps a stretch, and some frames around it, from being touched again."""
+        """Store a fault, and exclude its stretch and some frames around it from further faults."""
         around = max(int(0.05 * self.trial.fps), 2)
         own = [marker for marker in markers if marker < self.free.shape[1]]
         self.free[max(start - around, 0) : stop + around, own] = False
@@ -242,14 +267,19 @@ class Faults:
 
 
 def mirrored(trial: MarkerTrial) -> MarkerTrial:
-    """The trial as a left-handed system would write it: left and right of the room exchanged, labels kept."""
+    """Mirror a trial as a left-handed system writes it: left and right of the room exchanged, labels unchanged."""
     return trial.with_positions(trial.positions * [1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class PlantedError:
-    """centres: joint -> root mean square distance, metres. angles, raw: joint -> root mean square angle, radians, with
-    and without each segment's constant offset taken off. worst_centre: metres, 95th percentile over joints and frames.
+    """Error of a reconstruction.
+
+    Attributes:
+        centres: joint -> root mean square distance, m.
+        angles: joint -> root mean square angle, rad, each segment's constant offset removed.
+        raw: joint -> root mean square angle, rad, offsets included.
+        worst_centre: m, 95th percentile over joints and frames.
     """
 
     centres: dict[str, float]
@@ -259,22 +289,29 @@ class PlantedError:
 
     @property
     def centre(self) -> float:
-        """Root mean square over all joints, metres."""
+        """Root mean square distance over all joints, m."""
         return _rms(self.centres.values())
 
     @property
     def angle(self) -> float:
-        """Root mean square over all joints, radians, offsets taken off."""
+        """Root mean square angle over all joints, rad, offsets removed."""
         return _rms(self.angles.values())
 
     @property
     def raw_angle(self) -> float:
-        """Root mean square over all joints, radians, offsets left in."""
+        """Root mean square angle over all joints, rad, offsets included."""
         return _rms(self.raw.values())
 
 
 def planted_error(known: Planted, found: Motion) -> PlantedError:
-    """How far `found`, on any skeleton whose joints have the template's names, is from the truth, frame by frame."""
+    """Measure how far a reconstruction is from the ground truth, frame by frame.
+
+    Args:
+        known: the trial and its ground truth.
+        found: the reconstruction, on any skeleton whose joints have the template's names.
+    Returns:
+        The error.
+    """
     true_places, true_turns = _by_name(known.motion)
     places, turns = _by_name(found)
     count = min(len(known.motion), len(found))
@@ -297,19 +334,20 @@ def planted_error(known: Planted, found: Motion) -> PlantedError:
 
 
 def _by_name(motion: Motion) -> tuple[dict, dict]:
-    """Joint -> places (T, 3) and turns (T, 4) in the world."""
+    """Compute joint -> places (T, 3) and rotations (T, 4) in the world."""
     places, turns = forward_kinematics(motion)
     names = motion.skeleton.names
     return {n: places[:, i] for i, n in enumerate(names)}, {n: turns[:, i] for i, n in enumerate(names)}
 
 
 def _aligned(found: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """Turns (T, 4) of a segment in the axes in which they come nearest to the true ones."""
+    """Align the rotations (T, 4) of a segment with the true ones by the best constant offset."""
     offset = mean_rotation(quaternion.to_matrix(quaternion.multiply(quaternion.inverse(true), found)))
     return quaternion.multiply(found, quaternion.inverse(quaternion.from_matrix(offset)))
 
 
 def _off(found, found_above, true, true_above) -> float:
+    """Compute the root mean square angle between found and true joint rotations."""
     bend = quaternion.multiply(quaternion.inverse(found_above), found)
     wanted = quaternion.multiply(quaternion.inverse(true_above), true)
     angle = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(wanted), bend))

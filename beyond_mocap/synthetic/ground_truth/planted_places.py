@@ -1,10 +1,10 @@
-"""Where markers lie on a body, and how skin moves them: real marker sets, for bodies in the axes of marker models.
+"""Places of markers on a body, and how skin moves them: real marker sets, for bodies in the axes of marker models.
 
 Places follow the palpation points of Plug-in Gait (Vicon), the sets of baseball pitching and sprinting laboratories,
-and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis's four follow from its hip joints
-by Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width + 10.9 mm below and
-0.33 width + 7.3 mm beside the middle of the front spines) turned round. Each place scatters by some millimetres, as
-hands do that put markers on.
+and the widths of an adult's joints with the marker's own radius of 7 mm. The pelvis' four markers follow from its hip
+joints by the inverse of Harrington et al. 2007 (J. Biomech. 40, 595-602: centres 0.24 depth + 9.9 mm behind, 0.30 width
++ 10.9 mm below and 0.33 width + 7.3 mm beside the middle of the front spines). Each place varies by some millimetres,
+as with the hands that attach markers.
 
 Soft tissue has two parts, as measured on pins in bones (Cappozzo et al. 1996, Clin. Biomech. 11, 90-100; Camomilla et
 al. 2017, J. Biomech. 62, 5-13): a shift that follows the angles of the joints beside the segment, of which a share is
@@ -24,21 +24,25 @@ from ...motion.skeleton import Skeleton
 from .planted_body import adult_share
 
 _FOOT = (0.133, 0.0, -0.054)  # m from an adult's ankle to the toe joint
-_HEEL = 0.034  # m by which a heel's marker lies below the ankle, at least
-_DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; how much lower its front spines lie
-_COMMON = 0.45  # share of the shift that a whole cluster makes
-_RATE, _DAMPING = 11.0, 0.35  # Hz of wobbling flesh, and its damping ratio
-_LONGEST = 0.02  # m of lag behind the hardest shock
+_HEEL = 0.034  # m: least height of the ankle above a heel's marker
+_DEPTH, _TILT = 0.62, np.radians(9.0)  # of a pelvis: depth in widths; rad by which its front spines are lower
+_COMMON = 0.45  # share of the shift that is common to a whole cluster
+_RATE, _DAMPING = 11.0, 0.35  # natural frequency of flesh in Hz, and its damping ratio
+_LONGEST = 0.02  # m: most that flesh lags behind a shock
 
 
 @dataclass(frozen=True)
 class Place:
-    """One marker on the left side or in the middle.
+    """Place of one marker on the left side or in the middle.
 
-    on: the joint that carries it. to, share: begins at this share of the bone to the joint `to` ("shoulders": to the
-    middle between both). offset: millimetres from there (forward, left, up in a T-pose) on an adult. soft: millimetres
-    by which the skin under it shifts when a joint beside it bends by one radian. wobble: how much it lags behind
-    shocks, from 0 (bone) to 1 (a thigh's flesh)."""
+    Attributes:
+        on: the joint that carries it.
+        to: joint toward which the place starts ("shoulders": the middle between both), or None.
+        share: share of the bone from `on` to `to` at which the place starts.
+        offset: mm from there (forward, left, up in a T-pose) on an adult.
+        soft: mm by which the skin under it shifts when a joint beside it bends by one radian.
+        wobble: how much it lags behind shocks, from 0 (bone) to 1 (a thigh's flesh).
+    """
 
     on: str
     to: str | None
@@ -114,7 +118,7 @@ SIDED = {
     "ASI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=6.0, wobble=0.4),
     "PSI": Place("Hips", None, 0.0, offset=(0, 0, 0), soft=4.0, wobble=0.4),
 }  # fmt: skip
-# where shoulder blades are tracked apart
+# where shoulder blades are tracked separately
 _ON_BLADE = Place("Shoulder", "Arm", 1.0, offset=(-98, -78, -85), soft=9.0, wobble=0.4)
 _PIG = (
     "LFHD RFHD LBHD RBHD C7 T10 CLAV STRN RBAK LSHO LUPA LELB LFRM LWRA LWRB LFIN RSHO RUPA RELB RFRM RWRA RWRB RFIN "
@@ -142,15 +146,22 @@ SETS = {
     ),
     "lower_body": tuple("LASI RASI LPSI RPSI LTHI LKNE LTIB LANK LHEE LTOE RTHI RKNE RTIB RANK RHEE RTOE".split()),
 }
-"""Labels of the marker sets that can be planted."""
+"""Labels of the marker sets that can be synthesized."""
 STATIC_ONLY = {"sprinter": ("LMEPI", "RMEPI", "LMMAL", "RMMAL")}
-"""Markers that come off after the static trial."""
+"""Markers that are removed after the static trial."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Placed:
-    """Markers on a skeleton: labels (M), their joints (M,), places (M, 3) metres in the joint's axes, and how soft the
-    skin under them is: soft (M,) metres a radian, wobble (M,)."""
+    """M markers on a skeleton.
+
+    Attributes:
+        labels: labels.
+        joint: (M,) joint that carries each.
+        places: (M, 3) m in the joint's axes.
+        soft: (M,) m/rad, shift of the skin under it.
+        wobble: (M,) how much it lags behind shocks.
+    """
 
     labels: tuple[str, ...]
     joint: np.ndarray
@@ -160,7 +171,16 @@ class Placed:
 
 
 def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: float = 0.003) -> Placed:
-    """Those of `labels` that the skeleton (`planted_body.in_marker_axes`) has a joint for, scattered by `scatter` m."""
+    """Place markers on a skeleton.
+
+    Args:
+        skeleton: as `to_marker_axes` gives it.
+        labels: labels; those without a joint on the skeleton are left out.
+        seed: of the scatter.
+        scatter: standard deviation, m.
+    Returns:
+        The markers.
+    """
     rng = np.random.default_rng(seed)
     size = adult_share(skeleton)
     rows = []
@@ -177,7 +197,9 @@ def placed(skeleton: Skeleton, labels: tuple[str, ...], seed: int, scatter: floa
 
 
 def _place(label: str, blades: bool) -> tuple[Place, str] | None:
-    """Where a label lies, and the side's prefix of its joint. blades: whether shoulder blades are tracked apart."""
+    """Find the place of a label, and the side's prefix of its joint; blades: whether shoulder blades are tracked
+    separately.
+    """
     if blades and label in ("LBAK", "RBAK"):
         return _ON_BLADE, {"L": "Left", "R": "Right"}[label[0]]
     if label in MIDDLE:
@@ -190,33 +212,38 @@ def _place(label: str, blades: bool) -> tuple[Place, str] | None:
 
 
 def _at(skeleton: Skeleton, label: str, place: Place, side: str, size: float) -> np.ndarray:
+    """Compute the place (3,) m of a marker in its joint's axes."""
     mirrored = -1.0 if side == "Right" or (label[0] == "R" and label not in MIDDLE) else 1.0
     offset = np.array(place.offset) * [1.0, mirrored, 1.0] * 1e-3 * size
     if place.on == "Hips":
         return _on_pelvis(skeleton, label) + offset
     if place.to == "shoulders":
         return _shoulders(skeleton) + offset
-    if label[1:] in ("HEE", "HEEL"):  # as high as the toes', and some centimetres below the ankle on any rig
+    if label[1:] in ("HEE", "HEEL"):  # as high as the toes, and some centimetres below the ankle on any rig
         toes = _bone(skeleton, side + "ToeBase")[2]
         return offset * [1.0, 1.0, 0.0] + [0.0, 0.0, min(toes + offset[2], -_HEEL * size)]
     return place.share * _bone(skeleton, side + place.to) + offset if place.to else offset
 
 
 def _bone(skeleton: Skeleton, name: str) -> np.ndarray:
-    """From its parent to a joint (3,), at rest; nothing where there is no such joint, a usual foot without toes."""
+    """Offset (3,) m of a joint from its parent at rest; zero if there is no such joint, an average foot if there are no
+    toes.
+    """
     if name in skeleton.names:
         return skeleton.offsets[skeleton.index(name)]
     return np.array(_FOOT) * adult_share(skeleton) if name.endswith("ToeBase") else np.zeros(3)
 
 
 def _shoulders(skeleton: Skeleton) -> np.ndarray:
-    """From the chest's joint to the middle between both shoulder joints (3,), or to the neck of a body without arms."""
+    """Compute the vector (3,) m from the chest's joint to the middle of both shoulder joints, or to the neck without
+    arms.
+    """
     arms = [_bone(skeleton, side + "Shoulder") + _bone(skeleton, side + "Arm") for side in ("Left", "Right")]
     return np.mean(arms, axis=0) if "LeftArm" in skeleton.names else _bone(skeleton, "Neck")
 
 
 def _on_pelvis(skeleton: Skeleton, label: str) -> np.ndarray:
-    """A spine of the pelvis, or the sacrum's middle, in the hips' axes (3,)."""
+    """Compute a spine of the pelvis, or the sacrum's middle, in the hips' axes (3,) m."""
     left, right = (skeleton.offsets[skeleton.index(side + "UpLeg")] for side in ("Left", "Right"))
     half = 0.5 * np.linalg.norm(left - right)
     width = max((half - 0.0073) / 0.33, 0.12)
@@ -231,15 +258,30 @@ def _on_pelvis(skeleton: Skeleton, label: str) -> np.ndarray:
 
 
 def markers_on(motion: Motion, placed: Placed) -> np.ndarray:
-    """Markers (T, M, 3) metres, world, that stand still on their bones."""
+    """Compute markers that are rigid on their bones.
+
+    Args:
+        motion: the motion, T frames.
+        placement: M markers.
+    Returns:
+        (T, M, 3) m, world frame.
+    """
     positions, turns = forward_kinematics(motion)
     return positions[:, placed.joint] + quaternion.rotate(turns[:, placed.joint], placed.places)
 
 
 def on_skin(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int, softness: float = 1.0) -> np.ndarray:
-    """Markers (T, M, 3) metres, world, that the skin carries over the bones.
+    """Compute markers that the skin moves over the bones.
 
-    neutral: (J, 4) local rotations in which no skin is shifted. softness: factor on all shifts; 0 is bone."""
+    Args:
+        motion: the motion, T frames.
+        placement: M markers.
+        neutral: (J, 4) local rotations in which no skin is shifted.
+        seed: of the directions of the shifts.
+        softness: factor on all shifts; 0: bone.
+    Returns:
+        (T, M, 3) m, world frame.
+    """
     rigid = markers_on(motion, placed)
     if softness <= 0.0:
         return rigid
@@ -249,7 +291,7 @@ def on_skin(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int, soft
 
 
 def _shifts(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int) -> np.ndarray:
-    """What the joints' angles do to each marker (T, M, 3), metres in its segment's axes."""
+    """Compute the shifts (T, M, 3) m, in the segments' axes, that follow the joints' angles."""
     rng = np.random.default_rng(seed)
     bends = quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(neutral), motion.rotations))
     shifts = np.zeros((len(motion), len(placed.labels), 3))
@@ -263,8 +305,9 @@ def _shifts(motion: Motion, placed: Placed, neutral: np.ndarray, seed: int) -> n
 
 
 def _beside(motion: Motion, joint: int, bends: np.ndarray) -> np.ndarray:
-    """The bends (T, 6) radians of the joint above a segment (none for the root) and of the one below, levelled off
-    beyond a radian."""
+    """Compute the bends (T, 6) rad of the joint above a segment (none for the root) and of the one below, limited to a
+    radian.
+    """
     children = motion.skeleton.children(joint)
     own = bends[:, joint] if joint else np.zeros((len(motion), 3))
     below = np.mean([bends[:, child] for child in children], axis=0) if children else np.zeros((len(motion), 3))
@@ -272,12 +315,12 @@ def _beside(motion: Motion, joint: int, bends: np.ndarray) -> np.ndarray:
 
 
 def _directions(rng: np.random.Generator) -> np.ndarray:
-    """For each of six bends a direction of about unit length that the skin shifts in: (6, 3)."""
+    """Choose for each of six bends a direction of about unit length in which the skin shifts: (6, 3)."""
     return rng.normal(0.0, 1.0 / np.sqrt(3.0), (6, 3)) * np.repeat([0.8, 0.6], 3)[:, None]
 
 
 def _lag(rigid: np.ndarray, fps: float) -> np.ndarray:
-    """How a damped mass on each marker lags behind it (T, M, 3), metres, at most some centimetres."""
+    """Simulate how a damped mass on each marker lags behind it, (T, M, 3) m, limited to some centimetres."""
     from scipy.signal import cont2discrete, lfilter
 
     pull = 2.0 * np.pi * _RATE

@@ -143,8 +143,8 @@ def unlinked():
 
 @pytest.mark.parametrize("wrong, said", [
     (still, "plays no action"), (own, "plays this scene itself"), (beyond, "no motion on frames 900 to 950"),
-    (backward, "frames 30 to 20"), (lost, "volley_toss.* is not in the scene any more"),
-    (unlinked, "volley_toss.* is not in the scene any more"),
+    (backward, "frames 30 to 20"), (lost, "volley_toss.* is no longer in the scene"),
+    (unlinked, "volley_toss.* is no longer in the scene"),
 ])
 def test_what_cannot_be_is_told_and_changes_nothing(actor, wrong, said):
     wrong()

@@ -113,7 +113,7 @@ def test_an_edit_is_seen_and_its_own_making_is_not(two, room):
     assert not live.edited(two)
     settings().live = True
     settings().passes[0].to = settings().passes[0].who
-    assert not live.edited(two) and "himself" in settings().told
+    assert not live.edited(two) and "both passer and receiver" in settings().told
 
 
 def test_each_is_one_step_of_undo_and_clear_leaves_the_lists(two):
@@ -261,7 +261,7 @@ def test_a_net_comes_and_goes(two):
 
 @pytest.mark.parametrize("wrong, said", [
     (lambda: setattr(settings(), "library_folder", ""), "no folder chosen"),
-    (lambda: setattr(settings().passes[0], "to", settings().passes[0].who), "himself"),
+    (lambda: setattr(settings().passes[0], "to", settings().passes[0].who), "both passer and receiver"),
     (lambda: setattr(bpy.data.objects["Ben place"], "location", (0.0, 325.0, 0.0)), "Ann .*m apart"),
     (lambda: setattr(settings().players[0], "bone", "Tail"), "Tail"),
     (lambda: setattr(settings().players[1].place, "location", (0.0, -9000.0, 0.0)), "human|away"),

@@ -151,8 +151,8 @@ def test_each_is_one_step_of_undo(body):
 
 
 @pytest.mark.parametrize("arguments, said", [
-    ({"first": 9, "last": 9}, "a last frame behind the first"), ({"bone": "Tail"}, "no bone 'Tail'"),
-    ({"part": "chest", "first": 35}, "carried by Waver on frames 30 to 40 already"),
+    ({"first": 9, "last": 9}, "a last frame after the first one"), ({"bone": "Tail"}, "no bone 'Tail'"),
+    ({"part": "chest", "first": 35}, "already carried by Waver on frames 30 to 40"),
 ])
 def test_what_makes_no_sense_is_told_and_changes_nothing(ball, body, arguments, said):
     choose(ball, body)

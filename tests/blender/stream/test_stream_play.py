@@ -159,7 +159,7 @@ def test_it_is_one_step(playing, room):
 
 def test_an_armature_can_show_how(playing, room):
     """Its strike nearest to the present frame, without any stream; not one that has none."""
-    with pytest.raises(RuntimeError, match="no strike of the foot"):
+    with pytest.raises(RuntimeError, match="no strike with the foot"):
         bpy.context.view_layer.objects.active = playing.beyond_mocap_passes.players[1].body
         press(OPS.stream_act)
     bpy.ops.beyond_mocap.import_clips(filepath=str(CLIPS / "volley_toss.bvh"))

@@ -96,7 +96,7 @@ def test_the_left_foot_is_answered_with_the_left(library, rally):
     assert heights[0] > heights[1] + 0.05
 
 
-@pytest.mark.parametrize("target, said", [("Ann", "to himself"), ("Zoe", "one of Ann")])
+@pytest.mark.parametrize("target, said", [("Ann", "both passer and receiver"), ("Zoe", "one of Ann")])
 def test_a_target_that_is_none(library, rally, target, said):
     with pytest.raises(InputError, match=said):
         answer(library, rally, 2.0, hit_of("volley_pass"), target)

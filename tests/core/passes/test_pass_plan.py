@@ -154,7 +154,7 @@ def test_an_example_is_imitated(strikes_library):
 
 def test_an_example_that_is_not_there(strikes_library):
     late = {"clip": "volley_attack.bvh", "from": 90}
-    fouls = (({"clip": "none.bvh"}, "no recording"), (late, "seconds up to"), ({"clip": "ready_1.bvh"}, "no strike"))
+    fouls = (({"clip": "none.bvh"}, "no recording"), (late, "a time up to"), ({"clip": "ready_1.bvh"}, "no strike"))
     for example, word in fouls:
         with pytest.raises(InputError, match=word):
             planned(strikes_library, two(example=example))

@@ -155,13 +155,13 @@ def test_what_is_written(run, tmp_path):
 
 @pytest.mark.parametrize("change, word", [
     ({"players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [0, 0.1]}]}, "0.5 m or more"),
-    ({"passes": [{"from": "Ann", "to": "Ann"}]}, "to himself"),
+    ({"passes": [{"from": "Ann", "to": "Ann"}]}, "both passer and receiver"),
     ({"passes": [{"from": "Ann", "to": "Ben", "seconds": -1}]}, "from 0.2 to 10"),
     ({"passes": [{"from": "Ann", "to": "Ben", "part": "Tail"}]}, "lacks"),
     ({"passes": [{"from": "Ann", "to": "Ben", "seconds": 0.2, "bounces": 0}],
       "players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [60, 0]}]}, "up to 38 m/s"),
     ({"ball": "cannon"}, "one of paper"),
-    ({"ball": {"kind": "football", "drag": 0.5, "linear_drag": 2}}, "no way"),
+    ({"ball": {"kind": "football", "drag": 0.5, "linear_drag": 2}}, "no flight"),
     ({"pases": []}, "one of ball, defaults, directions"),
     ({"players": [{"name": "Ann", "place": [0, 0]}, {"name": "Ben", "place": [0, 1e6]}]}, "up to 1000"),
     ({"passes": [{"from": "Ann", "to": "Ben", "example": {"clip": "none.bvh"}}]}, "no recording"),
@@ -208,7 +208,7 @@ def test_strikes_that_no_words_tell_of_are_told(strikes_library):
         replace(clip, annotations=tuple(quiet(row) for row in clip.annotations)) for clip in strikes_library.clips
     )
     told = passes(replace(strikes_library, clips=silent, kept=None), scene).warnings
-    assert any("no words of the library tell of strikes with the tool" in line for line in told)
+    assert any("no labels of the library name strikes with the tool" in line for line in told)
 
 
 def test_who_gets_up_strikes_nothing(strikes_library):
