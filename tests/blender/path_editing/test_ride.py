@@ -255,7 +255,7 @@ def test_two_riders_each_on_his_own_or_both_on_one(scene, part):
     assert not first.beyond_mocap_ride.on and not second.beyond_mocap_ride.on and bpy.context.object in (first, second)
 
 
-BAD = {"one point": ([(0, 0, 0)], "no line"), "repeated": ([(1, 1, 0)] * 4, "all its points are one"),
+BAD = {"one point": ([(0, 0, 0)], "no line"), "repeated": ([(1, 1, 0)] * 4, "all points are equal"),
        "short": ([(0, 0, 0), (0.01, 0, 0)], "0.01 m long")}
 ODD = {"repeated points": [(0, 0, 0), (0, 0, 0), (2, 0, 0), (2, 0, 0), (4, 1, 0)],
        "cusp": [(0, 0, 0), (4, 0, 0), (0, 0.0, 0)],
@@ -757,7 +757,7 @@ def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
         point.co = point.handle_left = point.handle_right = (0, 0, 0)
     bpy.context.view_layer.update()
     follow(scene)
-    assert "all its points are one" in ride.told
+    assert "all points are equal" in ride.told
     bpy.ops.beyond_mocap.path_curve(shape="FITTED")
     follow(scene)
     assert ride.told == ""

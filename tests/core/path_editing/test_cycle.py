@@ -154,10 +154,10 @@ def test_a_recording_that_ends_at_the_loop_is_carried_on():
 
 
 @pytest.mark.parametrize("make, says", [
-    (still, "stays where it is"),
+    (still, "stays in place"),
     (lambda: planted(20), "can be repeated"),
     (lambda: prepare(gait(5.0, 1.0, 60.0).frames(0, 4), RideSettings()).residuals, "can be repeated"),
-    (lambda: prepare(gait(0.0, 3.0, 30.0), RideSettings()).residuals, "stays where it is"),
+    (lambda: prepare(gait(0.0, 3.0, 30.0), RideSettings()).residuals, "stays in place"),
 ])
 def test_what_has_no_stride_is_told(make, says):
     with pytest.raises(InputError, match=says) as told:
