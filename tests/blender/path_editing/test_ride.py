@@ -500,7 +500,7 @@ def test_who_rides_already_takes_the_selected_curve(scene, part):
     bpy.ops.beyond_mocap.edit_path()
     own = first.beyond_mocap_ride.curve
     choose(first)
-    with pytest.raises(RuntimeError, match="rides already"):
+    with pytest.raises(RuntimeError, match="already follows a path"):
         bpy.ops.beyond_mocap.edit_path()
     ring, point = circle(), drawn([(0, 0, 0)])
     before = bits(part, first), bits(part, second)
@@ -742,7 +742,7 @@ def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
     ride.cycle = True
     follow(scene)
     last = int(body.animation_data.action.frame_range[1])
-    assert last > 250 and ride.told.endswith(f"goes on to frame {last}, the scene ends at 250")
+    assert last > 250 and ride.told.endswith(f"ends at frame {last}, after the end of the scene at 250")
     assert scene.frame_end == 250
     scene.frame_end = last
     follow(scene)
