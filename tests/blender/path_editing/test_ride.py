@@ -296,7 +296,7 @@ def test_a_curve_that_is_no_path_is_told_and_the_last_good_motion_stays(scene, p
     assert line in body.beyond_mocap_ride.told and "\n" not in body.beyond_mocap_ride.told
     assert bits(part, body) == before
     bpy.data.objects.remove(odd)
-    assert live.follow(scene) == 0 and "its curve is gone" in body.beyond_mocap_ride.told
+    assert live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
     assert bits(part, body) == before
 
 
