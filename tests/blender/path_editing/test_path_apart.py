@@ -227,7 +227,7 @@ def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch)
     monkeypatch.setattr(module.bystanders, "__defaults__", (0.0,))
     bpy.ops.beyond_mocap.path_apart()
     [line] = said[0].left
-    assert line.startswith(f"{first.name} is left out") and "slow" in line
+    assert line.startswith(f"{first.name} is left out") and "too long" in line
 
 
 def test_a_statue_is_gone_round(scene, said):  # noqa: F811
