@@ -1,4 +1,4 @@
-"""Proposed labels for a clip, on the armature that shows it: reviewed one by one, accepted or rejected.
+"""Proposed labels for a clip, on the armature that shows it: reviewed one by one, accepted or refused.
 
 Each is listed with its confidence and reason. An accepted proposal becomes an ordinary strip or key moment; the list
 stores its source, which is written with the labels while they stay unchanged.
@@ -25,7 +25,7 @@ SAME = 0.1
 
 STATES = (("OPEN", "Open", "Not reviewed yet"),
           ("ACCEPTED", "Accepted", "Among the clip's labels"),
-          ("REFUSED", "Rejected", "Not what the clip shows"))
+          ("REFUSED", "Refused", "Not what the clip shows"))
 
 
 def _go(group, context):
@@ -125,12 +125,12 @@ def accept(target: bpy.types.Object, index: int) -> str:
 
 
 def refuse(target: bpy.types.Object, index: int) -> str:
-    """Reject a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
+    """Refuse a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
     one = _at(target, index)
     if one.state == "ACCEPTED":
         _take_back(target, row_of(one))
     one.state = "REFUSED"
-    return f"{one.name} rejected"
+    return f"{one.name} refused"
 
 
 def go_on(target: bpy.types.Object, step: int, only_open: bool = False) -> bool:
@@ -164,7 +164,7 @@ def sources(target: bpy.types.Object) -> "Sources":
 def _at(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     listed = target.beyond_mocap_proposals.listed
     if not 0 <= index < len(listed):
-        raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Review Proposals")
+        raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Look Through")
     return listed[index]
 
 

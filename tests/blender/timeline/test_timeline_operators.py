@@ -55,7 +55,7 @@ def test_text_and_file(player, asked, tmp_path):
     before = asked()
     assert before == "2.413 4 running left\n4 6 jogging\n6.02 kick right low\n9 header -jump\n"
     assert_one_step(ops.words_to_text)
-    text = bpy.data.texts["player1 words"]
+    text = bpy.data.texts["player1 labels"]
     assert text.as_string() == before and bpy.context.scene.beyond_mocap.players[0].annotation_text == text
     assert ops.export_words(filepath=str(tmp_path / "out.txt")) == {"FINISHED"}
     assert (tmp_path / "out.txt").read_text() == before
@@ -98,7 +98,7 @@ def test_split_and_join(player, asked):
 
 def test_moments(player, asked):
     bpy.context.scene.frame_set(1 + 24 * 8)
-    refused("Pick a key moment first", ops.delete_moment)
+    refused("Select a key moment first", ops.delete_moment)
     assert_one_step(ops.add_moment, words="receive foot")
     assert "8 receive foot\n" in asked()
     assert_one_step(ops.move_moment, frames=-24)
@@ -110,7 +110,7 @@ def test_moments(player, asked):
     assert "receive" not in asked()
     assert_one_step(ops.go_to_moment, strip="Moments", index=0)
     assert bpy.context.scene.frame_current == 145
-    refused("one that is there", ops.go_to_moment, strip="Moments", index=7)
+    refused("one of this strip", ops.go_to_moment, strip="Moments", index=7)
     assert_one_step(ops.edit_words, words="kick left top")
     assert "6.02 kick left top\n" in asked()
 
