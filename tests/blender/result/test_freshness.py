@@ -35,7 +35,7 @@ def test_nothing_is_out_of_date_at_first(renew, made, ready):  # noqa: F811
 
 
 @pytest.mark.parametrize("change, line", [
-    (lambda settings, match: setattr(settings, "alpha", 0.5), "choices in step 3"),
+    (lambda settings, match: setattr(settings, "alpha", 0.5), "settings of step 3"),
     (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0",
                                                                                                             ",0.1")),
      "track"),
@@ -93,7 +93,7 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     session.clear()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert "not in this session" in renew().lines and "1 hand-made key:" in renew().notes
+    assert "not in this session" in renew().lines and "1 manual key:" in renew().notes
     assert player.result.state == "ACCEPTED"
     bpy.ops.beyond_mocap.update()
     after = session.made(player.take).take
@@ -116,7 +116,7 @@ def test_a_stretch_is_another_solution_and_pressed_again_a_third(made, session):
 
 def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
     made.body.select_set(False)
-    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "nothing says which seconds")
+    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "no range of time is selected")
     scene = bpy.context.scene
     scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 61, 121
     take = made.take
@@ -147,7 +147,7 @@ def test_variants_to_choose_from(made, session):  # noqa: F811
     for a in range(3):
         for b in range(a):
             assert np.any(takes[a].motion.rotations != takes[b].motion.rotations, axis=(1, 2)).mean() > 0.5
-    assert "% other" in variants[1].summary and "slide" in variants[0].summary
+    assert "% different" in variants[1].summary and "slide" in variants[0].summary
     assert bpy.ops.beyond_mocap.preview(number=3) == {"FINISHED"}
     assert made.take == made.result.variants[2].name
     bpy.ops.beyond_mocap.accept()
