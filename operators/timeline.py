@@ -149,7 +149,7 @@ next. Shift-click also frames the body in the view"""
         """Set the frame and select the body."""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
-            raise InputError("player", self.player, "a name in the list", "look at step 2")
+            raise InputError("player", self.player, "a name in the list", "check the list in step 2")
         player = settings.players[self.player] if self.player else active_player(settings)
         context.scene.frame_set(self.frame(context.scene))
         body = player.body if player is not None else None

@@ -23,7 +23,7 @@ NUDGES = (
 )
 WORSE = {  # the effect of each frame
     "path": "Offsets turn with the path, seen from above: recommended",
-    "tangent": "Offsets turn with the full tangent: on a hill the body tilts, on a steep path it lies down",
+    "tangent": "Offsets turn with the full tangent: the body tilts on hills and lies flat on steep paths",
     "absolute": "Offsets do not turn with the path: in a bend the sway of the steps has the wrong direction",
 }
 

@@ -146,7 +146,7 @@ def _other_strides(scale: float) -> tuple[str, ...]:
 def _cut(loop: Loop) -> tuple[str, ...]:
     if loop.ending <= SEEN:
         return ()
-    return ("no number of loops fits the recorded end to the path's end: the motion is cut there",)
+    return ("no repetition of loops ends with the recorded end at the path's end: the motion is cut there",)
 
 
 def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:

@@ -162,7 +162,8 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
     firsts, ends = np.array(spans).T
     middle = (firsts + ends - 1) // 2
     sums = np.concatenate([np.zeros((1, 2, 2)), np.cumsum(feet, axis=0)])
-    # `before` and `after` index the stances around each frame; `way` is the time of the swing between them, from 0 to
+    # `before` and `after` index the stances around each frame; `time_share` is the time of the swing between them, from
+    # 0 to
     # 1.
     mean = (sums[ends] - sums[firsts]) / (ends - firsts)[:, None, None]
     height, slope = _planes(mean[:, 0], mean[:, 1], middle, surface)
@@ -181,7 +182,7 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
 def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
     """Compute the progress of a foot from stance to stance, from 0 to 1.
 
-    By distance over the ground, but by time, `way` (T,), at take-off and landing and where a step is short.
+    By distance over the ground, but by time, `time_share` (T,), at take-off and landing and where a step is short.
     """
     by_time = quintic_step_by_powers(way)
     step = there - here

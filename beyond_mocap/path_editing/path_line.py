@@ -151,7 +151,7 @@ def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
-    """Check a line; return it without repeated points, closed if asked, or raise InputError."""
+    """Check a line; return it without repeated points, closed if requested, or raise InputError."""
     line = np.asarray(line, dtype=float)
     if line.ndim != 2 or line.shape[1] != 3:
         raise InputError(name, f"is an array of shape {line.shape}", "points with three coordinates")
@@ -260,7 +260,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
     Returns:
         (N, 3) metres, N >= 2, pitch frame.
     Raises:
-        InputError: with the line, if a cell is not a number or lies beyond 10 km; if the file has fewer than two
+        InputError: with the line, if a cell is not a number or is beyond 10 km; if the file has fewer than two
             different points, or more than 100 km of path.
     """
     names, points = COLUMNS[:2], []

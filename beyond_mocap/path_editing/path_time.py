@@ -2,7 +2,7 @@
 
 By arc length (Path editing §3.2) the body passes the new path as fast as the motion passed its own path; by time
 (figure 3.8) each path takes the same time, whatever its length. A speed factor plays the motion faster or slower; the
-displayed frames then lie between recorded ones.
+displayed frames are then between recorded ones.
 
 By arc length the new path may also change the steps. Uphill and downhill steps are shorter and quicker at the same
 speed (runners at a given speed: Padulo et al. 2012, "Kinematics of running at different slopes and speeds"; walkers

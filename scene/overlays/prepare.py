@@ -101,7 +101,7 @@ class Prepared:
         meshes: overlay -> its meshes.
         pelvis: (T, 3) metres.
         toes: (T, 2, 3) metres, left and right.
-        stands: (T, 2) bool, contact of left and right foot.
+        contacts: (T, 2) bool, contact of left and right foot.
         figures: (T, J, 3) metres of the joints.
         pairs: (B, 2) joints of the lines of stick figures.
         pair_colours: (2 B, 4) of these lines.

@@ -92,12 +92,12 @@ class Sheet:
 
 
 def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, digest: str) -> None:
-    """Write the wanted values to their channels on whole frames, and the original's keys to all others.
+    """Write the target values to their channels on whole frames, and the original's keys to all others.
 
     Args:
         sheet: the actions.
         first: scene frame of the first value.
-        wanted: (N,) values by channel.
+        targets: (N,) values by channel.
         now: digest that the action has.
         digest: digest that the action gets.
     """

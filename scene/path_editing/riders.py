@@ -73,7 +73,7 @@ def forget() -> None:
 
 
 def anybody_shown() -> bool:
-    """Return whether any path edit has been computed; fast, since every redraw asks."""
+    """Return whether any path edit has been computed; fast, since every redraw calls it."""
     return bool(_shown)
 
 

@@ -25,7 +25,7 @@ class Look:
 
     Attributes:
         frames: (F,) scene frames.
-        lies: (F, 4, 4) world matrices of the object, Blender units.
+        world_matrices: (F, 4, 4) matrices of the object, Blender units.
         basis: (F, 4, 4) the object's own part of these.
         bones: names.
         poses: (F, B, 4, 4) pose matrices, armature space.

@@ -95,7 +95,7 @@ class Rows:
     """Source frames (N,) of the displayed frames, fractional in general, counted from the first sample.
 
     Attributes:
-        known: cache of table values there, by name; a path that is dragged asks for the same again.
+        known: cache of table values there, by name; a path that is dragged needs the same again.
     """
 
     def __init__(self, at: np.ndarray, count: int):
@@ -116,7 +116,7 @@ class Rows:
         return self.remembered(name, lambda: self._at(table, lambda a, b: quaternion.slerp(a, b, self.weight)))
 
     def remembered(self, name, made) -> np.ndarray:
-        """Return the cached value of a name, computed by `made` when missing."""
+        """Return the cached value of a name, computed by `compute` when missing."""
         if name not in self.known:
             self.known[name] = made()
         return self.known[name]
@@ -145,7 +145,7 @@ class Carried:
             rig: the armature.
             parts: its parts.
             seen: its samples.
-            rides: what each control depends on.
+            dependencies: what each control depends on.
             object_keyed: whether the object itself is animated.
             motion: the motion that the parts show.
             units: Blender units in a metre.
@@ -203,7 +203,7 @@ class Carried:
     def _bent(self, rig: bpy.types.Object) -> list[Control]:
         """List the bones of legs and arms that inverse kinematics without a pole bends.
 
-        The solver starts from the bones' own rotations, so that the wanted pose is set as its start.
+        The solver starts from the bones' own rotations, so that the target pose is set as its start.
         """
         found = []
         for bone in rig.pose.bones:

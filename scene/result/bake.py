@@ -35,8 +35,8 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
 
     Args:
         context: for the scene.
-        order: the player.
-        made: the take with its plan.
+        owner: the player.
+        result: the take with its plan.
     Returns:
         The armature.
     """

@@ -192,7 +192,7 @@ def _notes(player: BeyondMocapPlayer) -> list[str]:
     if body is None or player.result.state == "NONE":
         return []
     key = (body.session_uid, player.take, player.result.state)
-    if bpy.app.background or key not in _now["hand"]:  # without a window no handler tells of changes
+    if bpy.app.background or key not in _now["hand"]:  # without a window no handler reports changes
         _now["hand"][key] = len(hand_keys.of_body(body)[0])
     count = _now["hand"][key]
     keys = "manual key" if count == 1 else "manual keys"

@@ -62,7 +62,7 @@ class Done(NamedTuple):
 
     Attributes:
         line: for the user.
-        words: whether labels changed, which makes it an undo step.
+        changed_labels: whether labels changed, which makes it an undo step.
     """
 
     line: str

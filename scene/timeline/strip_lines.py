@@ -89,7 +89,7 @@ def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: st
     return replace(kept, time=time, line=None)
 
 
-def said(text: str, start: float, end: float | None = None, where: str = "words") -> Span | KeyMoment:
+def said(text: str, start: float, end: float | None = None, where: str = "labels") -> Span | KeyMoment:
     """Parse typed labels to a span, or without an end to a key moment.
 
     Args:

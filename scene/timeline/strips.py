@@ -45,7 +45,7 @@ def add_span(context: bpy.types.Context, player: BeyondMocapPlayer, start_s: flo
         context: for the scene.
         player: whose timeline.
         start_s, end_s: seconds on the track's clock.
-        words: labels as in the text form, "-word" for one that must not occur.
+        labels: as in the text form, "-word" for one that must not occur.
     Returns:
         The span with its strip.
     Raises:

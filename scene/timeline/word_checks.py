@@ -46,7 +46,7 @@ def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True
     Args:
         scene: for the library.
         item: a span or key moment.
-        asked: of a player; the labels of a clip need not be in the library.
+        for_player: of a player; the labels of a clip need not be in the library.
     Returns:
         One line for each problem.
     """

@@ -49,7 +49,7 @@ TABLES = {
             "path turn with: the path (default); its full tangent or nothing, for comparison", title="Offsets",
             tooltip="What the body's offsets from the path turn with"),
         Setting(name="lean", default=True, option="--no-lean", help="do not lean into bends", tooltip="Lean into bends "
-            "as far as their radius and the speed require"),
+            "according to their radius and the speed"),
         Setting(name="bends", default=False, option="--slow-in-bends", help="slow down in tight bends as people do",
             title="Slow in Bends", tooltip="Slow down in tight bends as people do (two-thirds power law)"),
         Setting(name="climbs", default=False, option="--slow-on-slopes", help="slow down on slopes as people do",

@@ -75,7 +75,7 @@ def test_add_span(player, asked):
     assert "0 1 standing\n" in asked()
     ops.add_span(words="sprinting", start=10.0, end=11.5)
     assert "10 11.5 sprinting\n" in asked()
-    refused("words", ops.add_span, words="3 walking")
+    refused("labels", ops.add_span, words="3 walking")
     refused("not after the start", ops.add_span, words="walking", start=3.0, end=2.0)
 
 
