@@ -29,8 +29,8 @@ DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
 
 
 class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
-    """Let the motion of the selected armature follow a curve along its path, which you can edit (Tab). A selected curve
-becomes the path instead. Revert restores the original action"""
+    """Let the motion of the selected armature follow a curve that can be edited (Tab): a new one along its own path, or
+a selected curve"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
@@ -83,7 +83,7 @@ def bodies(context) -> list[bpy.types.Object]:
 
 class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
     """Create another curve for the armature: along the original path, straight, or along the current path with other
-points. The previous curve is removed if nothing else uses it"""
+points"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"
@@ -116,8 +116,8 @@ class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):
-    """Find collisions between bodies on paths, and with other bodies, and resolve them by small waits and detours. If
-two or more bodies are selected, only those yield"""
+    """Find collisions of bodies on paths, with each other and with other bodies, and resolve them by small waits and
+detours of all or of two or more selected bodies"""
 
     bl_idname = "beyond_mocap.path_apart"
     bl_label = "Avoid Collisions"
@@ -154,7 +154,7 @@ two or more bodies are selected, only those yield"""
 
 
 class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
-    """Turn the motion on its new path into an ordinary action with a key on every frame. The original action and the
+    """Turn the motion on its new path into an ordinary action with a key on every frame; the original action and the
 curve stay in the file"""
 
     bl_idname = "beyond_mocap.bake_path"
@@ -173,8 +173,7 @@ curve stay in the file"""
 
 
 class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
-    """Restore the armature's original motion exactly. The curve stays in the scene, and Edit Path can use it
-again"""
+    """Restore the armature's original motion exactly; the curve stays in the scene for the next Edit Path"""
 
     bl_idname = "beyond_mocap.leave_path"
     bl_label = "Revert"

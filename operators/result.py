@@ -31,8 +31,8 @@ class ResultVerb(Verb):
 
 
 class BEYOND_MOCAP_OT_accept(ResultVerb, bpy.types.Operator):
-    """Apply the previewed take to the body, as one action or as an NLA strip for each piece of a clip. An applied
-result can be converted from one form to the other"""
+    """Apply the previewed take to the body, as one action or as an NLA strip for each piece of a clip, or convert an
+applied result to the other form"""
 
     bl_idname = "beyond_mocap.accept"
     bl_label = "Apply"
@@ -103,7 +103,7 @@ class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
 
 class BEYOND_MOCAP_OT_error_curves(Verb, bpy.types.Operator):
     """Show the active player's errors over time as curves in the Graph Editor: root error, foot slide, foot
-corrections, jerk, speed, cuts. They are custom properties of the armature and belong to the take"""
+corrections, jerk, speed, cuts"""
 
     bl_idname = "beyond_mocap.error_curves"
     bl_label = "Error Curves"

@@ -114,8 +114,8 @@ def _settle(scene: int) -> None:
 
 
 class BEYOND_MOCAP_OT_jump_to(Verb, bpy.types.Operator):
-    """Go to the frame of this line and select the player's body. If a line has several frames, each click goes to the
-next. Shift-click also frames the body in the view"""
+    """Go to the frame of this line, or the next one of several, and select the player's body; Shift-click also frames
+the body in the view"""
 
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"

@@ -140,8 +140,7 @@ def _mirrored(item):
 
 
 class BEYOND_MOCAP_OT_edit_words(TimelineVerb, bpy.types.Operator):
-    """Edit the labels of the selected key moment, or of the selected span. Labels that are unknown, or that the library
-does not have, are shown while you type"""
+    """Edit the labels of the selected key moment or span, with problems shown while you type"""
 
     bl_idname = "beyond_mocap.edit_words"
     bl_label = "Edit Labels"
@@ -251,8 +250,8 @@ class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operato
 
 
 class BEYOND_MOCAP_OT_import_words(ImportVerb, bpy.types.Operator):
-    """Import a text file of labels ('START END labels', 'TIME labels') as strips of the active player, or of the
-library clip whose armature is active. Existing strips are replaced"""
+    """Import a text file of labels ('START END labels', 'TIME labels') in place of the strips of the active player, or
+of the library clip whose armature is active"""
 
     bl_idname = "beyond_mocap.import_words"
     bl_label = "Import Labels"
@@ -284,7 +283,7 @@ class BEYOND_MOCAP_FH_words(bpy.types.FileHandler):
     """Text files of labels dropped into a view"""
 
     bl_idname = "BEYOND_MOCAP_FH_words"
-    bl_label = "Labels of the Active Player or Clip"
+    bl_label = "Labels (Text File)"
     bl_import_operator = "beyond_mocap.import_words"
     bl_file_extensions = ".txt"
 

@@ -101,6 +101,7 @@ def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
         return interpolate(inside, at, table)
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Find the nearest place of the path for each place, and its height and slope."""
         # Start where the body is, then step along the tangent: a path that crosses itself keeps its own level.
         s = passed[frames].copy()
         for _ in range(_ROUNDS):
@@ -127,6 +128,7 @@ def mesh_surface(terrain: Terrain, origin: np.ndarray) -> Surface:
     """
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Look up height and slope of the mesh below the path's level."""
         below = origin[frames, 2] + ABOVE
         height, normal = terrain.heights(places, below)
         none = ~np.isfinite(height)

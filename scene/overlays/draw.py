@@ -287,6 +287,7 @@ def _scale(title: str, stops, factor: float, unit: str):
     """Build a legend row with a colour scale and its numbers."""
 
     def row(x: float, y: float, scale: float) -> float:
+        """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         step, width = LINE * size, SWATCH * scale
         height = 2 * step + 0.6 * size + 2 * margin
@@ -308,6 +309,7 @@ def _keys(*entries: tuple[str, tuple]):
     """Build a legend row of coloured squares with labels."""
 
     def row(x: float, y: float, scale: float) -> float:
+        """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         blf.size(FONT, size)
         widths = [blf.dimensions(FONT, text)[0] + 2.4 * size for text, _ in entries]

@@ -61,6 +61,7 @@ def seen(scene: bpy.types.Scene) -> list[riders.Shown]:
 
 
 def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> list[Item]:
+    """Build the items of one edited body for the switched-on overlays."""
     source, ridden, found = shown.source, shown.ridden, []
     row, was = shown.frames(frame)  # rows of the edited motion and of the original
     if "path_source" in on:

@@ -182,6 +182,7 @@ class PlainCarrier(Carrier):
         return byte_digest(np.array(body.matrix_world), rest, form)
 
     def read(self, scene: bpy.types.Scene) -> Read:
+        """Read the motion of the bones' channels."""
         found, slot = self._original()
         motion = action.read(self.body, scene, found, slot)
         if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
@@ -202,6 +203,7 @@ class PlainCarrier(Carrier):
         channels.assign(self.body, made, next(slot for slot in made.slots if slot.identifier == identifier))
 
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+        """Write the changed channels, and the original ones resampled where other source frames are displayed."""
         made, slot = self.ours()
         sheet = keys.Sheet.of(made, slot, *self.source())
         wanted = self._wanted(scene, read, ridden, sheet)

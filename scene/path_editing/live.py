@@ -70,6 +70,7 @@ def _keep(body: bpy.types.Object, figures: dict) -> None:
 
 
 def _tick() -> float:
+    """Check once: start to measure a body at rest, or collect a result; returns the seconds until the next check."""
     if bpy.app.is_job_running("RENDER"):
         return LOOK
     if _running:
@@ -104,6 +105,7 @@ def _waits(body: bpy.types.Object) -> bool:
 
 
 def _collect() -> float:
+    """Store the result of a finished job if its body has not changed since."""
     job, uid, number = _running[0]
     if not job.poll():
         return WAIT

@@ -316,6 +316,7 @@ class Carried:
         return quaternion.inverse(base), own, quaternion.multiply(base, own)
 
     def _slid(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+        """Compute the locations (N, 3) of controls with their own location channel."""
         if not some:
             return {}
 

@@ -89,6 +89,7 @@ class RigSource:
         return rows.remembered((path, index), lambda: self._own(path, index, rows))
 
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
+        """Sample a channel of the source from the tables."""
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
             steps = np.array_equal(table, np.round(table))

@@ -52,6 +52,7 @@ class RigCarrier(Carrier):
             raise no_motion(self.body)
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
+        """Compute a digest of rest pose, rates, rotation modes, constraints and unanimated ancestors."""
         body = self.body
         rest = np.empty(16 * len(body.data.bones), np.float32)
         body.data.bones.foreach_get("matrix_local", rest)
@@ -84,6 +85,9 @@ class RigCarrier(Carrier):
         return RigRead(rig.motion, rig.start, None, tuple(rig.told), rig)
 
     def begin(self) -> None:
+        """Store the original and play an action of ours: a copy of the original, or a new one if several layers
+        play.
+        """
         body, (original, slot) = self.body, self.source()
         several = layered(body)
         put_aside(self.ride.before, body)
@@ -101,6 +105,7 @@ class RigCarrier(Carrier):
         channels.assign(body, made, own)
 
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+        """Write the controls' channels that differ from the source."""
         made, slot = self.ours()
         rig, (original, own) = read.rig, self.source()
         sources = {} if made[KIND] == "layers" or original is None else channels.curves(original, own)

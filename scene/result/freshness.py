@@ -66,6 +66,7 @@ def fingerprint(value: Any) -> str:
 
 
 def _feed(digest, value: Any) -> None:
+    """Feed a value and its structure to a digest."""
     if is_dataclass(value):
         for place in fields(value):
             if place.metadata.get("later") and getattr(value, place.name) == place.default:

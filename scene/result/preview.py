@@ -269,6 +269,7 @@ def _follow(context: bpy.types.Context, takes: list) -> None:
 
 
 def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
+    """Restore ball, camera and scene length to their state before any preview."""
     if shared.ball.kept and ball is not None:
         if shared.ball.made:
             _remove(ball)

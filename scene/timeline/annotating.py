@@ -87,6 +87,7 @@ def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
 
 
 def _done(context: bpy.types.Context, command: Command) -> Done:
+    """Run a command by its type."""
     if isinstance(command, AddMoment):
         return Done(_add_moment(context, KeyMoment(command.time, command.words)), True)
     if isinstance(command, AddSpan):
@@ -139,6 +140,7 @@ def _add_span(context: bpy.types.Context, span: Span) -> str:
 
 
 def _at_playhead(context: bpy.types.Context, what: str) -> Done:
+    """Edit the item at the playhead: nudge, mirror or remove it; without a key moment, move the playhead."""
     target = strips.timeline_subject(context)
     clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     found = None if target is None else _found(context, target, clock)
@@ -165,6 +167,7 @@ def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
 
 
 def _mirror(target, found: PlacedMoment | PlacedSpan) -> str:
+    """Swap left and right in the labels of an item."""
     item = found.key if isinstance(found, PlacedMoment) else found.span
     other = replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
     if other == item:
@@ -191,6 +194,7 @@ def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str
 
 
 def _next_moment(context: bpy.types.Context, step: int) -> str:
+    """Move the playhead to the next or previous key moment and select it."""
     target = strips.timeline_subject(context)
     clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)

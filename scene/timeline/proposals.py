@@ -169,6 +169,7 @@ def _at(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
 
 
 def _take_back(target: bpy.types.Object, row: ClipAnnotation) -> None:
+    """Remove the strips and markers with the labels and times of a row."""
     fps = target[RATE]
     if row.key is not None:
         for placed in lanes.moments(target):
