@@ -264,7 +264,7 @@ def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.nd
     for _ in range(_FIRMER + 1):
         bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
         bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
-        # Feet in contact that miss their goal get more weight, until all are within _NEAR.
+        # Feet in contact that miss their goal get more weight, until all are within _GOAL_TOLERANCE.
         off = np.where(stands, np.abs(foot.length - bend**2 - far), 0.0) / _NEAR
         if off.max(initial=0.0) <= 1.0:
             break

@@ -318,7 +318,7 @@ def strain_lines(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[Time
 
 
 def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
-    """Select the frames of `bad` (T,) where it holds for LASTING metres within the metre around."""
+    """Select the frames of `bad` (T,) where it holds for LASTING_METRES metres within the metre around."""
     if not bad.any():
         return bad
     step = np.abs(np.diff(arc, prepend=arc[:1]))
@@ -329,7 +329,7 @@ def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _joined(which: np.ndarray, fps: float) -> np.ndarray:
-    """Fill the gaps of at most _JOINED seconds between true frames of `which` (T,)."""
+    """Fill the gaps of at most _JOIN_SECONDS seconds between true frames of `which` (T,)."""
     out, gap = which.copy(), int(_JOINED * fps)
     spans = runs(which)
     for (_, end), (first, _) in zip(spans[:-1], spans[1:]):

@@ -208,7 +208,7 @@ def _strides(standing: np.ndarray, loop: Loop) -> bool:
 
 def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
            stride: float) -> list[tuple[int, int]]:
-    """Search pairs (start, end) of similar frames at a low rate: up to _TRIED, all well separated."""
+    """Search pairs (start, end) of similar frames at a low rate: up to _MOST_CANDIDATES, all well separated."""
     count, fps = len(features), residuals.fps
     every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
     ends = np.arange(0, count, every)
@@ -236,8 +236,8 @@ def _liking(length: np.ndarray, still: np.ndarray, stride: float) -> np.ndarray:
 
 
 def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
-    """Select the first _TRIED pairs (K, 2), best first, of which no two are within `reach` frames in both start and
-    end.
+    """Select the first _MOST_CANDIDATES pairs (K, 2), best first, of which no two are within `reach` frames in both
+    start and end.
     """
     kept: list[tuple[int, int]] = []
     while len(pairs) and len(kept) < _TRIED:

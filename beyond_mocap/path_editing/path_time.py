@@ -199,7 +199,7 @@ def way_of(path: Path, arc: ArcLength) -> Way:
 
 
 def way_at(way: Way, arc: np.ndarray, pace: np.ndarray) -> Way:
-    """Sample a profile where a motion is; a body slower than _MOVES has no curvature.
+    """Sample a profile where a motion is; a body slower than _BEND_SPEED has no curvature.
 
     Args:
         profile: of the path.

@@ -306,7 +306,8 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
 
 
 def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Fit Bezier points (P, 3) on the path and their left and right handles, denser in bends, within _CLOSE of it.
+    """Fit Bezier points (P, 3) on the path and their left and right handles, denser in bends, within _FIT_TOLERANCE of
+    it.
 
     Corners that were cut would make the motion run ahead of the path from there on.
     """
@@ -350,7 +351,7 @@ def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
 
 
 def _close_enough(path: Path, degree: int) -> np.ndarray:
-    """Fit the fewest control points whose spline is within _CLOSE of the path."""
+    """Fit the fewest control points whose spline is within _FIT_TOLERANCE of the path."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
     from ...beyond_mocap.path_editing import path_line
 

@@ -88,8 +88,8 @@ def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: 
 def said_already(told: Timeline, row: ClipAnnotation, fps: float) -> bool:
     """Return whether a timeline already has the labels of a row.
 
-    That is a key moment with the same first label within SAME seconds of the row's key, or a span with the same labels
-    over half of a row without a key.
+    That is a key moment with the same first label within SAME_SECONDS seconds of the row's key, or a span with the same
+    labels over half of a row without a key.
     """
     if row.key is not None:
         return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME for key in told.keys)
