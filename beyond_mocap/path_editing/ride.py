@@ -291,7 +291,7 @@ def _timed(source: RideSource, path: Path, arc: ArcLength,
         around = cycled(residuals, asked, source.loops)
         residuals, seams, told = around.residuals, around.seams, around.told
     elif settings.cycle:
-        told = ("cycling has no effect without Keep Speed: the motion fills the whole path",)
+        told = ("by time the motion fills the whole path: cycling has no effect",)
     if source.still:
         told += ("the motion stays in place: it is put at the start of the path",)
     if way is not None:

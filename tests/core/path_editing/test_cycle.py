@@ -181,7 +181,7 @@ def test_an_endless_path_is_not_filled_endlessly(walk, monkeypatch):
     monkeypatch.setattr(cycle, "MOST_FRAMES", 3000)
     out = cycled(walk, 1e9)
     assert 2000 < len(out.residuals) < 3500
-    assert "1000000000 m long: the motion ends after 1 minutes" in out.told[0]
+    assert "1000000000 m is too long: the motion ends after 1 minutes" in out.told[0]
 
 
 def test_a_body_without_known_feet_is_repeated_by_its_poses():
