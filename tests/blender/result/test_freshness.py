@@ -39,7 +39,7 @@ def test_nothing_is_out_of_date_at_first(renew, made, ready):  # noqa: F811
     (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0",
                                                                                                             ",0.1")),
      "track"),
-    (lambda settings, match: setattr(settings, "track_window", 2.0), "choices"),
+    (lambda settings, match: setattr(settings, "track_window", 2.0), "settings"),
     (lambda settings, match: bpy.data.objects.remove(settings.players[0].body), "body has been deleted"),
 ])
 def test_each_cause_has_its_line_and_update_mends_it(renew, made, ready, match, change, line):  # noqa: F811
@@ -59,13 +59,13 @@ def test_words_of_a_text_stay_the_words(renew, made, ready, scene):  # noqa: F81
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     assert strips.read(made, bpy.context.scene) is None and renew().lines == ""
     text.write("8.0 12.0 jogging\n")
-    assert "words" in renew().lines
+    assert "labels" in renew().lines
 
 
 def test_words(renew, made, ready, session, scene):  # noqa: F811
     plans, strips = scene("result.plans"), scene("timeline.strips")
     strips.add_moment(bpy.context, made, 9.0, ("kick",))
-    assert "words" in renew().lines
+    assert "labels" in renew().lines
     bpy.ops.beyond_mocap.update()
     assert renew().lines == "" and session.made(made.take).plan.timeline == plans.plan_of(ready, made)[0].timeline
 
