@@ -431,12 +431,12 @@ def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
     assert live.follow(scene) == 1
     was = bits(part, body)[:3]
     bpy.ops.object.delete()
-    assert live.follow(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
-    assert bits(part, body)[:3] == was
+    assert (live.follow(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
+            and bits(part, body)[:3] == was)
     choose(drawn)
     bpy.ops.object.delete()
-    assert live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
-    assert bits(part, body)[:3] == was
+    assert (live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+            and bits(part, body)[:3] == was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
     assert body.beyond_mocap_ride.curve is None and body.beyond_mocap_ride.ground is None
