@@ -1,4 +1,4 @@
-"""Path editing: let a motion follow a curve that can be edited, keep bodies apart, bake or revert it."""
+"""Path editing: let a motion follow a curve that can be edited, avoid collisions, apply or revert it."""
 
 from __future__ import annotations
 
@@ -17,40 +17,39 @@ from .verb import NEEDS_NO_EDITING, Verb
 
 
 class RiderVerb(Verb):
-    """A verb about the riders that are meant; greyed, with the reason, where there are none."""
+    """A verb about edited bodies; disabled, with the reason, without any."""
 
-    needs = "Select an armature that rides a path, or its curve", lambda context: bool(meant(context))
+    needs = "Select an armature that follows a path, or its curve", lambda context: bool(meant(context))
 
 
 COUNT = {"name": "Points", "default": 0, "min": 0, "max": 200,
-         "description": "Control points of the curve; 0: as many as it needs to lie within 3 cm"}
+         "description": "Number of control points of the curve; 0: as many as it needs to stay within 3 cm"}
 DEGREE = {"name": "Degree", "default": 3, "min": 2, "max": 5,
-          "description": "Of a NURBS: how smooth it is, and how far each control point reaches"}
+          "description": "Degree of a NURBS curve: how smooth it is, and how far each control point reaches"}
 
 
 class BEYOND_MOCAP_OT_edit_path(Verb, bpy.types.Operator):
-    """Lay the selected armature's motion on a curve along its path: edit the curve (Tab), and the motion follows. A
-selected curve becomes the path instead, also of who rides already. The original action is put aside; Leave brings it
-back"""
+    """Let the motion of the selected armature follow a curve that can be edited (Tab): a new one along its own path, or
+a selected curve"""
 
     bl_idname = "beyond_mocap.edit_path"
     bl_label = "Edit Path"
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
+    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
-    straight: BoolProperty(name="Straight", description="A straight line, as long, instead of the original path")
-    needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and a curve if it is to ride that one",
+    straight: BoolProperty(name="Straight", description="A straight line as long as the original path")
+    needs = (*NEEDS_NO_EDITING, "Select an armature with a motion, and optionally a curve as its new path",
              lambda context: bool(bodies(context)))
 
     def do(self, context):
-        """Curve and motion, and the curve active."""
+        """Create the curve, start the path edits and select the curve."""
         channels.check_local(context.scene)
         chosen = bodies(context)
         drawn = next((thing for thing in context.selected_objects if thing.type == "CURVE"), None)
         riding = [(body, body.beyond_mocap_ride.curve) for body in chosen if body.beyond_mocap_ride.on]
         if drawn is None and len(riding) == len(chosen):
-            raise InputError(f"armature {chosen[0].name}", "it rides already", "one that does not",
-                             "edit its curve, or press Leave")
+            raise InputError(f"armature {chosen[0].name}", "already follows a path", "an armature without a path edit",
+                             "edit its curve, or press Revert")
         begun, used = [], drawn
         try:
             for body, _ in riding if drawn is not None else ():
@@ -65,7 +64,7 @@ back"""
             for body, before, made in begun:
                 riders.revert(body, before, made)
             for body, before in riding:
-                with suppress(BeyondMocapError):  # who could not ride his curve before cannot now
+                with suppress(BeyondMocapError):  # a body that could not follow its curve before still cannot
                     riders.change(context.scene, body, before)
             raise
         if context.mode == "POSE":
@@ -76,27 +75,27 @@ back"""
 
 
 def bodies(context) -> list[bpy.types.Object]:
-    """The armatures that are meant: the active one first, and the other selected ones."""
+    """List the armatures to edit: the active one first, then the other selected ones."""
     active = context.view_layer.objects.active
     return sorted((thing for thing in context.selected_objects if thing.type == "ARMATURE"),
                   key=lambda thing: thing != active)
 
 
 class BEYOND_MOCAP_OT_path_curve(Verb, bpy.types.Operator):
-    """Give the rider another curve: along the original path, straight, or as the path is now with other points. The
-curve before is removed if it was made here and nobody else rides it"""
+    """Create another curve for the armature: along the original path, straight, or along the current path with other
+points"""
 
     bl_idname = "beyond_mocap.path_curve"
     bl_label = "New Curve"
-    shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Where the new curve runs")
+    shape: EnumProperty(name="Shape", items=curve.SHAPES, default="FITTED", description="Shape of the new curve")
     count: IntProperty(**COUNT)
-    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of curve that is made")
+    kind: EnumProperty(name="Curve", items=curve.KINDS, default="BEZIER", description="Kind of the new curve")
     degree: IntProperty(**DEGREE)
-    needs = (*NEEDS_NO_EDITING, "Select an armature that rides a path, or its curve",
+    needs = (*NEEDS_NO_EDITING, "Select an armature that follows a path, or its curve",
              lambda context: bool(meant(context)))
 
     def do(self, context):
-        """The curve, which becomes active."""
+        """Create the curve and make it active."""
         body = meant(context)[0]
         made = riders.new_curve(context, body, self.shape, count=self.count, kind=self.kind, degree=self.degree)
         if context.mode == "POSE":
@@ -105,7 +104,7 @@ curve before is removed if it was made here and nobody else rides it"""
 
 
 class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
-    """Work out the rider's motion anew: after edits of the original action, while Live is off, or in a script"""
+    """Update the motion on its path: after edits of the original action, while Live is off, or in a script"""
 
     bl_idname = "beyond_mocap.update_path"
     bl_label = "Update Path"
@@ -117,19 +116,19 @@ class BEYOND_MOCAP_OT_update_path(RiderVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_path_apart(Verb, bpy.types.Operator):
-    """Find where riders would run into each other or another body, and let them wait a little or make a small detour,
-as little as it takes. Of two or more selected riders only those give way; otherwise all do"""
+    """Find collisions of bodies on paths, with each other and with other bodies, and resolve them by small waits and
+detours of all or of two or more selected bodies"""
 
     bl_idname = "beyond_mocap.path_apart"
-    bl_label = "Keep Apart"
+    bl_label = "Avoid Collisions"
     distance: FloatProperty(name="Distance", default=0.6, min=0.05, max=20.0, soft_max=2.0, precision=2,
-                            description="Metres between the middles of two bodies at least")
+                            description="Least distance between the middles of two bodies, in metres")
     delay: FloatProperty(name="Longest Wait", default=2.0, min=0.0, max=60.0, soft_max=10.0, precision=2,
-                         unit="TIME_ABSOLUTE", description="Seconds that a rider may begin later")
+                         unit="TIME_ABSOLUTE", description="Longest wait of a body before it starts")
     detour: FloatProperty(name="Widest Detour", default=0.8, min=0.0, max=20.0, soft_max=3.0, precision=2,
-                          description="Metres that a rider may leave its path to the side")
-    clear: BoolProperty(name="Clear", description="Only take back the waits and detours of before")
-    needs = "Let an armature ride a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
+                          description="Largest distance of a detour from the path, in metres")
+    clear: BoolProperty(name="Clear", description="Only remove all waits and detours")
+    needs = "Let an armature follow a path first (Edit Path)", lambda context: bool(riders_in(context.scene))
 
     def do(self, context):
         from ..beyond_mocap.path_editing.apart import Limits
@@ -145,9 +144,9 @@ as little as it takes. Of two or more selected riders only those give way; other
         self.tell(kept)
 
     def tell(self, kept):
-        """What was found and what was asked for."""
+        """Report the collisions and the changes."""
         if not kept.before and not kept.left:
-            self.report({"INFO"}, f"Nobody comes within {self.distance:.2f} m of another")
+            self.report({"INFO"}, f"No bodies come within {self.distance:.2f} m of each other")
             return
         found = "1 collision" if kept.before == 1 else f"{kept.before} collisions"
         lines = "; ".join([found, *keep_apart.lines_of(kept)])
@@ -155,30 +154,29 @@ as little as it takes. Of two or more selected riders only those give way; other
 
 
 class BEYOND_MOCAP_OT_bake_path(RiderVerb, bpy.types.Operator):
-    """Keep the motion on its new path as an ordinary action with a key on every frame. The original action and the
+    """Turn the motion on its new path into an ordinary action with a key on every frame; the original action and the
 curve stay in the file"""
 
     bl_idname = "beyond_mocap.bake_path"
-    bl_label = "Keep"
+    bl_label = "Apply"
 
     def do(self, context):
-        """All that are meant; of who could not follow lately, the last motion that could be worked out."""
+        """Apply all target bodies; where a motion cannot be updated, its last state."""
         chosen = meant(context)
         for body in chosen:
             riders.may_keep(body)
         kept = [riders.keep(context.scene, body) for body in chosen]
         riders.back_to(context, chosen)
-        self.report({"INFO"}, f"kept as {', '.join(action.name for action, _ in kept)}")
+        self.report({"INFO"}, f"applied as {', '.join(action.name for action, _ in kept)}")
         for line in (told for _, told in kept if told):
-            self.report({"WARNING"}, f"the last motion that could be worked out is kept: {line}")
+            self.report({"WARNING"}, f"the motion cannot be updated, so its last state is applied: {line}")
 
 
 class BEYOND_MOCAP_OT_leave_path(RiderVerb, bpy.types.Operator):
-    """Give the armature its original motion back, exactly as it was. The curve stays, and Edit Path takes it up
-again"""
+    """Restore the armature's original motion exactly; the curve stays in the scene for the next Edit Path"""
 
     bl_idname = "beyond_mocap.leave_path"
-    bl_label = "Leave"
+    bl_label = "Revert"
 
     def do(self, context):
         chosen = meant(context)
@@ -187,35 +185,34 @@ again"""
 
 
 DIRECTIONS = (("LEFT", "Left", "Along -X", "TRIA_LEFT", 0), ("RIGHT", "Right", "Along X", "TRIA_RIGHT", 1),
-              ("FORTH", "Forth", "Along Y", "TRIA_UP", 2), ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
+              ("FORTH", "Forward", "Along Y", "TRIA_UP", 2), ("BACK", "Back", "Along -Y", "TRIA_DOWN", 3),
               ("UP", "Up", "Along Z", "SORT_DESC", 4), ("DOWN", "Down", "Along -Z", "SORT_ASC", 5))
 AXES = {"LEFT": (-1.0, 0.0, 0.0), "RIGHT": (1.0, 0.0, 0.0), "BACK": (0.0, -1.0, 0.0), "FORTH": (0.0, 1.0, 0.0),
         "UP": (0.0, 0.0, 1.0), "DOWN": (0.0, 0.0, -1.0)}
 
 
 class BEYOND_MOCAP_OT_nudge_points(Verb, bpy.types.Operator):
-    """Move the selected control points or handles by the set step along an axis of the world, whichever way the view
-looks"""
+    """Move the selected control points or handles by one step along a world axis"""
 
     bl_idname = "beyond_mocap.nudge_points"
     bl_label = "Nudge Points"
-    direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Which way, in the world")
+    direction: EnumProperty(name="Direction", items=DIRECTIONS, default="RIGHT", description="Direction in the world")
     step: FloatProperty(name="Step", default=0.0, min=0.0, precision=3, options={"SKIP_SAVE"},
-                        description="Metres to move; 0: the step that is set in the panel Path Editing")
-    needs = "Select a curve and go into edit mode with Tab first", lambda context: context.mode == "EDIT_CURVE"
+                        description="Metres to move; 0: the step set in the Path Editing panel")
+    needs = "Select a curve and enter edit mode (Tab) first", lambda context: context.mode == "EDIT_CURVE"
 
     @classmethod
     def description(cls, _context, properties):
-        """With the key that does the same."""
+        """Return the tooltip with the shortcut."""
         way = next(item[2].lower() for item in DIRECTIONS if item[0] == properties.direction)
         key = {"FORTH": "Up Arrow", "BACK": "Down Arrow", "UP": "Page Up", "DOWN": "Page Down"}
-        return (f"Move the selected control points or handles by the step, {way} of the world.\n"
+        return (f"Move the selected control points or handles by one step, {way} of the world\n"
                 f"Alt + {key.get(properties.direction) or properties.direction.capitalize() + ' Arrow'}")
 
     def do(self, context):
-        """Blender's own move, since it knows what a handle does to its neighbour."""
+        """Move by Blender's own operator, which also updates neighbouring handles."""
         step = (self.step or context.scene.beyond_mocap.nudge_step) * units_per_metre(context.scene)
         moved = bpy.ops.transform.translate("EXEC_DEFAULT", value=[step * part for part in AXES[self.direction]],
                                             orient_type="GLOBAL", mirror=False, use_proportional_edit=False, snap=False)
         if moved != {"FINISHED"}:
-            raise InputError("nudge", "no control point selected", "one or more", "click on a point first")
+            raise InputError("nudge", "no control point is selected", "one or more", "click on a point first")

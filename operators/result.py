@@ -1,4 +1,4 @@
-"""Results: accept, discard or preview takes, and their error curves."""
+"""Results: apply, revert or preview takes, and their error curves."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from .verb import Verb
 
 
 class ResultVerb(Verb):
-    """A verb about the results of one player, or of all that are ticked."""
+    """A verb about the results of one player, or of all selected players."""
 
     player: StringProperty(name="Player", options={"SKIP_SAVE"},
-                           description="Whose result; empty: of all ticked players")
+                           description="Player of the result; empty: all selected players")
 
     def chosen(self, context) -> list:
-        """The players in question."""
+        """List the target players."""
         players = context.scene.beyond_mocap.players
         if self.player:
             if self.player not in players:
-                raise InputError("player", self.player, "a name in the list", "look at step 2")
+                raise InputError("player", self.player, "a name in the list", "check the list in step 2")
             return [players[self.player]]
         return [player for player in players if player.use]
 
 
 class BEYOND_MOCAP_OT_accept(ResultVerb, bpy.types.Operator):
-    """Keep what is shown: the take stays on the body, as one action or as a strip for each piece of a clip.
-Accepted results can be turned from one form into the other"""
+    """Apply the previewed take to the body, as one action or as an NLA strip for each piece of a clip, or convert an
+applied result to the other form"""
 
     bl_idname = "beyond_mocap.accept"
-    bl_label = "Accept"
-    form: EnumProperty(name="As", items=FORMS, default="ACTION", description="What the take becomes")
+    bl_label = "Apply"
+    form: EnumProperty(name="As", items=FORMS, default="ACTION", description="Form of the applied take")
     needs = ("Synthesize first", lambda context: any(player.use and (player.take or player.result.state != "NONE")
                                                      for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        """Show those that are not shown yet, then keep all."""
+        """Show takes that are not shown yet, then apply all."""
         players = [player for player in self.chosen(context) if player.take or player.result.state != "NONE"]
         for player in players:
             preview.check(player)
@@ -49,7 +49,7 @@ Accepted results can be turned from one form into the other"""
         lost = [player.name for player in unseen if session.made(player.take) is None]
         if lost or not players:
             found = f"no take of {', '.join(lost) or 'any player'} in this session"
-            raise InputError("accept", found, "a take", "synthesize again")
+            raise InputError("apply", found, "a take", "synthesize again")
         for line in (line for player in players for line in preview.off_path(player)):
             self.report({"INFO"}, line)
         for player in unseen:
@@ -58,14 +58,15 @@ Accepted results can be turned from one form into the other"""
         if bodies[-1].name in context.view_layer.objects:  # else its collection is excluded
             context.view_layer.objects.active = bodies[-1]
         kind = "one action each" if self.form == "ACTION" else "NLA strips"
-        self.report({"INFO"}, f"accepted as {kind}: {', '.join(player.name for player in players)}")
+        self.report({"INFO"}, f"applied as {kind}: {', '.join(player.name for player in players)}")
 
 
 class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
-    """Put the preview away: what the body played before is played again, and what was made for the preview goes"""
+    """Revert the preview: the body plays its previous animation again, and everything created for the preview is
+removed"""
 
     bl_idname = "beyond_mocap.discard"
-    bl_label = "Discard"
+    bl_label = "Revert"
     needs = ("No preview is shown: Synthesize shows one",
              lambda context: any(player.use and player.result.state == "PREVIEW"
                                  for player in context.scene.beyond_mocap.players))
@@ -73,40 +74,40 @@ class BEYOND_MOCAP_OT_discard(ResultVerb, bpy.types.Operator):
     def do(self, context):
         players = [player for player in self.chosen(context) if player.result.state == "PREVIEW"]
         if not players:
-            raise InputError("discard", "no preview is shown", "a preview", "synthesize first")
+            raise InputError("revert", "no preview is shown", "a preview", "synthesize first")
         for player in players:
             for line in preview.off_path(player):
                 self.report({"INFO"}, line)
             preview.discard(context, player)
             show_automatic(context, player)
-        self.report({"INFO"}, f"discarded: {', '.join(player.name for player in players)}")
+        self.report({"INFO"}, f"reverted: {', '.join(player.name for player in players)}")
 
 
 class BEYOND_MOCAP_OT_preview(ResultVerb, bpy.types.Operator):
-    """Show this one of the variants that were made; Accept keeps the one that is shown"""
+    """Preview this variant; Apply keeps the variant that is shown"""
 
     bl_idname = "beyond_mocap.preview"
     bl_label = "Preview"
-    number: IntProperty(name="Variant", default=1, min=1, description="Which one, from 1")
+    number: IntProperty(name="Variant", default=1, min=1, description="Number of the variant, from 1")
     needs = ("No variants: press Variants first",
              lambda context: any(player.result.variants for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        """Show it on the named player, or the active one."""
+        """Show the variant on the named player, or the active one."""
         player = self.chosen(context)[0] if self.player else active_player(context.scene.beyond_mocap)
         if player is None:
-            raise InputError("preview", "no player is chosen", "a player with variants", "choose one in step 2")
+            raise InputError("preview", "no player is active", "a player with variants", "click one in step 2")
         preview.show_variant(context, player, self.number - 1)
         show_automatic(context, player)
 
 
 class BEYOND_MOCAP_OT_error_curves(Verb, bpy.types.Operator):
-    """Show the active player's errors over time as curves in the Graph Editor: root error, slide of both feet, foot
-corrections, jerk, speed, cuts. They are custom properties of the armature and go with the take"""
+    """Show the active player's errors over time as curves in the Graph Editor: root error, foot slide, foot
+corrections, jerk, speed, cuts"""
 
     bl_idname = "beyond_mocap.error_curves"
     bl_label = "Error Curves"
-    remove: BoolProperty(name="Remove", options={"SKIP_SAVE"}, description="Take the curves away instead")
+    remove: BoolProperty(name="Remove", options={"SKIP_SAVE"}, description="Remove the curves instead")
 
     @classmethod
     def poll(cls, context):
@@ -119,12 +120,12 @@ corrections, jerk, speed, cuts. They are custom properties of the armature and g
     def do(self, context):
         player = active_player(context.scene.beyond_mocap)
         if player is None or player.body is None:
-            raise InputError("error curves", "no player with a body", "one", "synthesize first")
+            raise InputError("error curves", "the active player has no body", "a body", "synthesize first")
         if player.body.library is not None or player.body.data.library is not None:
-            raise InputError(f"body {player.body.name}", "linked from another file", "an armature of this file")
+            raise InputError(f"body {player.body.name}", "is linked from another file", "an armature of this file")
         if self.remove:
             quality.remove_error_curves(player.body)
         elif session.made(player.take) is None:
-            raise InputError(f"player {player.name}", "no take in this session", "a take", "synthesize again")
+            raise InputError(f"player {player.name}", "has no take in this session", "a take", "synthesize again")
         else:
             quality.write_error_curves(context.scene, player)

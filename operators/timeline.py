@@ -1,4 +1,4 @@
-"""The timeline of a player: show it, go through it, and its key moments."""
+"""The timeline of a player: show it, navigate it, and edit its key moments."""
 
 from __future__ import annotations
 
@@ -21,49 +21,49 @@ from .verb import Verb
 class TimelineVerb(Verb):
     """A verb for the active player's timeline, or for that of a library clip that is being annotated."""
 
-    needs = ("Import tracking in step 2 first, and bring its players to the timeline",
+    needs = ("Import tracking in step 2 first, and place its players in the timeline",
              lambda context: timeline_subject(context) is not None)
 
     def attempt(self, action):
-        """As ever; the lines about words are worked out anew."""
+        """Run the action, then update the problems of labels."""
         done = super().attempt(action)
         word_checks.keep(bpy.context)
         return done
 
 
 class WritingVerb(TimelineVerb):
-    """A verb that brings the timeline about where there is none yet."""
+    """A verb that creates the timeline if there is none yet."""
 
     needs = "Import tracking in step 2 first", lambda context: can_have_timeline(context)
 
 
 class MomentVerb(TimelineVerb):
-    """A verb for the picked key moment."""
+    """A verb for the selected key moment."""
 
-    needs = (*TimelineVerb.needs, "Pick a key moment first: click its name in the NLA editor or in the list",
+    needs = (*TimelineVerb.needs, "Select a key moment first: click its name in the NLA editor or in the list",
              lambda context: is_picked(timeline_subject(context)))
 
 
 def is_picked(target: bpy.types.Object) -> bool:
-    """Whether a key moment is picked, found without reading any words."""
+    """Return whether a key moment is selected, without parsing labels."""
     return any(marker.select for _, strip in lanes.strips(target) for marker in strip.action.pose_markers)
 
 
 def picked(target: bpy.types.Object) -> lanes.PlacedMoment:
-    """The picked key moment; InputError where there is none."""
+    """Find the selected key moment. Raises InputError if there is none."""
     found = next((moment for moment in lanes.moments(target) if moment.selected), None)
     if found is None:
-        raise InputError(subject_name(target), "no key moment is picked", "one", "click its name in the NLA editor")
+        raise InputError(subject_name(target), "no key moment is selected", "one", "click its name in the NLA editor")
     return found
 
 
 def selected_spans(target: bpy.types.Object) -> list[lanes.PlacedSpan]:
-    """The spans whose strips are selected, by start."""
+    """List the spans whose strips are selected, by start."""
     return [span for span in lanes.spans(target) if span.selected]
 
 
 def draw_complaints(layout, context: bpy.types.Context, item) -> None:
-    """What is wrong with the words of the span or key moment that `item()` returns, a line each."""
+    """Draw what is wrong with the labels of the span or key moment that `item()` returns, a line each."""
     try:
         lines = word_checks.lines_for(context.scene, item())
     except InputError as error:
@@ -73,12 +73,12 @@ def draw_complaints(layout, context: bpy.types.Context, item) -> None:
 
 
 def playhead(context: bpy.types.Context, target: bpy.types.Object) -> float:
-    """The playhead, in seconds on the clock of the object's strips."""
+    """Compute the playhead in seconds on the clock of the object's strips."""
     return subject_clock(context, target).seconds(context.scene.frame_current_final)
 
 
 class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
-    """Open the NLA editor below the 3D view, with the strips of all players in it and its Beyond Mocap tab"""
+    """Open the NLA editor below the 3D view, with the strips of all players and its Beyond Mocap tab"""
 
     bl_idname = "beyond_mocap.show_timeline"
     bl_label = "Show Timeline"
@@ -87,7 +87,7 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
              lambda context: any(player.dot for player in context.scene.beyond_mocap.players))
 
     def do(self, context):
-        """Find or open it, show its sidebar and all strips."""
+        """Find or open the editor, show its sidebar and all strips."""
         area = window.open_editor(context, "NLA_EDITOR", "HORIZONTAL", 0.4)
         if area is None:
             return
@@ -101,7 +101,7 @@ class BEYOND_MOCAP_OT_show_timeline(Verb, bpy.types.Operator):
 
 
 def _settle(scene: int) -> None:
-    """What an editor takes only once it has been drawn: which tab is in front, and what it shows."""
+    """Set the active tab and the view, which an editor accepts only after it has been drawn."""
     for shown in bpy.context.window_manager.windows:
         for area in shown.screen.areas:
             if area.type != "NLA_EDITOR" or shown.scene.session_uid != scene:
@@ -114,41 +114,42 @@ def _settle(scene: int) -> None:
 
 
 class BEYOND_MOCAP_OT_jump_to(Verb, bpy.types.Operator):
-    """Go to the frame that this line is about, and select the player's body. Where a line names several, each press
-goes to the next. Shift-click also brings the body into view"""
+    """Go to the frame of this line, or the next one of several, and select the player's body; Shift-click also frames
+the body in the view"""
 
     bl_idname = "beyond_mocap.jump_to"
     bl_label = "Jump To"
     seconds: FloatProperty(name="Seconds", options={"SKIP_SAVE"},
-                           description="Second on the tracking file's clock to go to")
+                           description="Time to go to, on the tracking file's clock")
     stops: StringProperty(
         name="Stops", options={"SKIP_SAVE"},
-        description="Seconds with blanks between, instead: to the next one behind the current frame, from the last to "
-        "the first"
+        description="Several times separated by blanks; each call goes to the next one after the current frame, from "
+        "the last to the first"
     )
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Whose body; empty: the active player's")
-    frame_view: BoolProperty(name="Bring into View", options={"SKIP_SAVE"},
-                             description="Move the 3D views so that the body is seen")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Player whose body is selected; empty: "
+                           "the active player")
+    frame_view: BoolProperty(name="Frame in View", options={"SKIP_SAVE"},
+                             description="Move the 3D views so that the body is visible")
 
     def invoke(self, context, event):
-        """As the button was pressed."""
+        """Run with the state of the Shift key."""
         self.frame_view = self.frame_view or event.shift
         return self.execute(context)
 
     def frame(self, scene) -> int:
-        """The scene frame to go to."""
+        """Compute the scene frame to go to."""
         try:
             seconds = [float(text) for text in self.stops.split()] or [self.seconds]
         except ValueError:
-            raise InputError("stops", repr(self.stops), "seconds with blanks between") from None
+            raise InputError("stops", repr(self.stops), "seconds separated by blanks") from None
         frames = sorted(int(round(bake.frame_at(scene, second))) for second in seconds)
         return next((frame for frame in frames if frame > scene.frame_current), frames[0])
 
     def do(self, context):
-        """Set the frame, select the body."""
+        """Set the frame and select the body."""
         settings = context.scene.beyond_mocap
         if self.player and self.player not in settings.players:
-            raise InputError("player", self.player, "a name in the list", "look at step 2")
+            raise InputError("player", self.player, "a name in the list", "check the list in step 2")
         player = settings.players[self.player] if self.player else active_player(settings)
         context.scene.frame_set(self.frame(context.scene))
         body = player.body if player is not None else None
@@ -161,7 +162,7 @@ goes to the next. Shift-click also brings the body into view"""
 
 
 def _bring_into_view(context) -> None:
-    """Let every 3D view show what is selected."""
+    """Frame the selection in every 3D view."""
     for area in context.screen.areas:
         if area.type == "VIEW_3D":
             region = next(region for region in area.regions if region.type == "WINDOW")
@@ -170,21 +171,21 @@ def _bring_into_view(context) -> None:
 
 
 class BEYOND_MOCAP_OT_go_to_moment(TimelineVerb, bpy.types.Operator):
-    """Put the playhead on this key moment and pick it"""
+    """Move the playhead to this key moment and select it"""
 
     bl_idname = "beyond_mocap.go_to_moment"
     bl_label = "Go to Key Moment"
     strip: StringProperty(name="Strip", options={"SKIP_SAVE"}, description="The strip whose action has the marker")
-    index: IntProperty(name="Index", options={"SKIP_SAVE"}, description="Which marker of the action it is")
+    index: IntProperty(name="Index", options={"SKIP_SAVE"}, description="Index of the marker on the action")
 
     def do(self, context):
-        """Pick it, and go there."""
+        """Select the moment and set the frame."""
         target = timeline_subject(context)
         strip = lanes.strip_named(target, self.strip or lanes.MOMENTS)
         markers = strip.action.pose_markers
         if not 0 <= self.index < len(markers):
             found = f"key moment {self.index} of strip {strip.name!r}"
-            raise InputError(subject_name(target), found, "one that is there", f"it has {len(markers)}")
+            raise InputError(subject_name(target), found, "one of this strip", f"it has {len(markers)}")
         lay_strips.pick(target, strip.name, self.index)
         context.scene.frame_set(lanes.marker_frame(strip, markers[self.index]))
 
@@ -193,18 +194,18 @@ STILL = 4  # pixels that the pointer may move before a click becomes a drag
 
 
 class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
-    """Pick the key moment whose name is under the pointer; drag it to move the moment, Esc puts it back"""
+    """Select the key moment whose name is under the pointer; drag it to move the moment, Esc cancels"""
 
     bl_idname = "beyond_mocap.pick_moment"
-    bl_label = "Pick Key Moment"
+    bl_label = "Select Key Moment"
     bl_options = {"UNDO", "INTERNAL"}
 
     def execute(self, context):
-        """Only a pointer can pick."""
-        return self.failed("Pick Key Moment works with the pointer in the NLA editor; Go to Key Moment picks by index")
+        """Fail without a pointer."""
+        return self.failed("Select Key Moment needs the pointer in the NLA editor; use Go to Key Moment with an index")
 
     def invoke(self, context, event):
-        """Pick what is under the pointer; where that is nothing, the click is Blender's own."""
+        """Select what is under the pointer; if there is nothing, pass the click to Blender."""
         region = context.region
         if region is None or region.type != "WINDOW":
             return {"PASS_THROUGH"}
@@ -221,15 +222,15 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def pick(self, target, name):
-        """Pick it, and remember what it says."""
+        """Select the moment and store its labels."""
         lay_strips.check_editable(target)
         lay_strips.pick(target, name.strip, name.index)
         self.before = next((moment for moment in lanes.moments(target) if moment.selected), None)
         if self.before is None:
-            raise InputError(target.name, "this key moment cannot be read", "words", "rename it in the list")
+            raise InputError(target.name, "this key moment cannot be read", "labels", "rename it in the list")
 
     def modal(self, context, event):
-        """Follow the pointer by whole frames until the button is let go."""
+        """Follow the pointer by whole frames until the button is released."""
         if event.type in {"ESC", "RIGHTMOUSE"} and event.value == "PRESS":
             self.put(context, self.before.key)
             return {"CANCELLED"}
@@ -244,17 +245,17 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def follow(self, context, x: float):
-        """The moment on the frame that lies as far from its own as the pointer from where it was pressed."""
+        """Move the moment by as many frames as the pointer moved since the press."""
         view = context.region.view2d
         way = view.region_to_view(x, 0)[0] - view.region_to_view(self.begun, 0)[0]
         frame = self.frame + round(way)
         clock = lanes.written_for(context.scene.objects[self.target])
         back = frame == self.frame
         self.put(context, self.before.key if back else replace(self.before.key, time=clock.seconds(frame)))
-        context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: put back")
+        context.area.header_text_set(f"Frame {frame} ({frame - self.frame:+d})    Esc: Cancel")
 
     def put(self, context, key):
-        """Write the key moment and show it."""
+        """Write the key moment and redraw it."""
         target = context.scene.objects[self.target]
         now = next(moment for moment in lanes.moments(target) if moment.selected)
         if now.key != key:
@@ -265,17 +266,17 @@ class BEYOND_MOCAP_OT_pick_moment(Verb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
-    """Add a key moment at the playhead: a kick, a header, a catch, met to half a frame"""
+    """Add a key moment at the playhead: a kick, a header, a catch, exact to half a frame"""
 
     bl_idname = "beyond_mocap.add_moment"
     bl_label = "Add Key Moment"
-    words: StringProperty(name="Words", default="kick", description="What happens there; -word for what must not be")
+    words: StringProperty(name="Labels", default="kick", description="Labels of the moment; a leading - excludes one")
 
     def invoke(self, context, _event):
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
-        """The words, and what is wrong with them."""
+        """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words")
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0))
 
@@ -286,11 +287,11 @@ class BEYOND_MOCAP_OT_add_moment(WritingVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
-    """Move the picked key moment to the playhead"""
+    """Move the selected key moment to the playhead"""
 
     bl_idname = "beyond_mocap.move_moment"
     bl_label = "Move Key Moment"
-    frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="By how many frames; 0 moves to the playhead")
+    frames: IntProperty(name="Frames", options={"SKIP_SAVE"}, description="Frames to move by; 0: move to the playhead")
 
     def do(self, context):
         target = timeline_subject(context)
@@ -300,7 +301,7 @@ class BEYOND_MOCAP_OT_move_moment(MomentVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_delete_moment(MomentVerb, bpy.types.Operator):
-    """Take the picked key moment away"""
+    """Delete the selected key moment"""
 
     bl_idname = "beyond_mocap.delete_moment"
     bl_label = "Delete Key Moment"

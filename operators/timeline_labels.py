@@ -21,24 +21,23 @@ from .verb import ImportVerb, Verb
 
 
 class BEYOND_MOCAP_OT_add_span(WritingVerb, bpy.types.Operator):
-    """Add a stretch with words: over the preview range where one is set (P in the editor), else one second from the
-playhead on"""
+    """Add a span with labels over the preview range (P in the editor), or one second from the playhead without one"""
 
     bl_idname = "beyond_mocap.add_span"
     bl_label = "Add Span"
-    words: StringProperty(name="Words", default="running", description="What is done there; -word for what must not be")
+    words: StringProperty(name="Labels", default="running", description="Labels of the span; a leading - excludes one")
     start: FloatProperty(
         name="From", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
-        description="Seconds on the track's clock; where From and To are equal, the preview range or the playhead",
+        description="Start on the track's clock; if From and To are equal, the preview range or the playhead",
     )
     end: FloatProperty(name="To", default=0.0, unit="TIME_ABSOLUTE", precision=3, options={"SKIP_SAVE"},
-                       description="Seconds on the track's clock")
+                       description="End on the track's clock")
 
     def invoke(self, context, _event):
         return context.window_manager.invoke_props_dialog(self, width=420)
 
     def draw(self, context):
-        """The words, and what is wrong with them."""
+        """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words")
         draw_complaints(self.layout, context, lambda: said(self.words, 0.0, 1.0))
 
@@ -46,14 +45,14 @@ playhead on"""
         given = round(self.start, 4), round(self.end, 4)  # Blender's numbers are not finer
         start, end = given if self.end != self.start else self.stretch(context)
         if end <= start:
-            raise InputError("span", f"the end {end:g} is not after the start {start:g}", "START < END")
+            raise InputError("span", f"the end {end:g} s is not after the start {start:g} s", "an end after the start")
         span = said(self.words, start, end)
         target = subject_with_lanes(context)
         lay_strips.add_span(target, span, subject_clock(context, target))
 
     @staticmethod
     def stretch(context) -> tuple[float, float]:
-        """The preview range, or a second from the playhead on."""
+        """Compute the preview range, or a second from the playhead on."""
         scene, there = context.scene, timeline_subject(context) or subject_with_lanes(context)
         time = subject_clock(context, there)
         if scene.use_preview_range:
@@ -62,7 +61,7 @@ playhead on"""
 
 
 class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
-    """Split the spans under the playhead there; where strips are selected, only those. Both parts keep the words"""
+    """Split the spans at the playhead, or only the selected ones; both parts keep the labels"""
 
     bl_idname = "beyond_mocap.split_span"
     bl_label = "Split Span at Playhead"
@@ -75,14 +74,14 @@ class BEYOND_MOCAP_OT_split_span(TimelineVerb, bpy.types.Operator):
         there = [span for span in there if span.selected] or there
         if not there:
             found = "no span is under the playhead"
-            raise InputError(subject_name(target), found, "one", "put the playhead into a strip")
+            raise InputError(subject_name(target), found, "one", "move the playhead into a strip")
         for placed in there:
             lay_strips.change_span(target, placed.strip, replace(placed.span, end=time))
             lay_strips.add_span(target, replace(placed.span, start=time), clock)
 
 
 class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
-    """Join the selected spans into one, from the first one's start to the last one's end, with the first one's words"""
+    """Join the selected spans into one, from the first start to the last end, with the labels of the first span"""
 
     bl_idname = "beyond_mocap.join_spans"
     bl_label = "Join Spans"
@@ -96,7 +95,7 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
         return sum(strip.action.beyond_mocap.kind != "moments" for strip in chosen) > 1
 
     def do(self, context):
-        """The first one is lengthened, the others go; their key moments stay."""
+        """Extend the first span and remove the others; their key moments stay."""
         target = timeline_subject(context)
         chosen = selected_spans(target)
         if len(chosen) < 2:
@@ -115,13 +114,13 @@ class BEYOND_MOCAP_OT_join_spans(TimelineVerb, bpy.types.Operator):
 
 
 class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
-    """Exchange left and right in the words of the picked key moment and of the selected spans"""
+    """Swap left and right in the labels of the selected key moment and spans"""
 
     bl_idname = "beyond_mocap.mirror_side"
     bl_label = "Mirror Side"
 
     def do(self, context):
-        """Change all whose words have a side."""
+        """Change all items whose labels have a side."""
         target = timeline_subject(context)
         moments = [moment for moment in lanes.moments(target) if moment.selected]
         sided = [placed for placed in moments if _mirrored(placed.key) != placed.key]
@@ -136,31 +135,30 @@ class BEYOND_MOCAP_OT_mirror_side(TimelineVerb, bpy.types.Operator):
 
 
 def _mirrored(item):
-    """The span or key moment with its sides exchanged."""
+    """Mirror the labels of a span or key moment."""
     return replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
 
 
 class BEYOND_MOCAP_OT_edit_words(TimelineVerb, bpy.types.Operator):
-    """Change the words of the picked key moment, or of the selected span where none is picked. Words that are unknown,
-or that the library does not have, are told while you type"""
+    """Edit the labels of the selected key moment or span, with problems shown while you type"""
 
     bl_idname = "beyond_mocap.edit_words"
-    bl_label = "Edit Words"
-    words: StringProperty(name="Words", description="What is done; -word for what must not be")
+    bl_label = "Edit Labels"
+    words: StringProperty(name="Labels", description="Labels of the item; a leading - excludes one")
 
     def invoke(self, context, _event):
-        """Show the words that are there now."""
+        """Open the dialog with the present labels."""
         if self.attempt(lambda: self.load(context)) == {"CANCELLED"}:
             return {"CANCELLED"}
         return context.window_manager.invoke_props_dialog(self, width=480)
 
     def load(self, context):
-        """The words that are there now."""
+        """Load the present labels."""
         placed = chosen(timeline_subject(context))
         self.words = words_of(placed.key if isinstance(placed, lanes.PlacedMoment) else placed.span)
 
     def draw(self, context):
-        """The words, and what is wrong with them."""
+        """Draw the labels and what is wrong with them."""
         self.layout.prop(self, "words", text="")
         draw_complaints(self.layout, context, lambda: _said(self.words, chosen(timeline_subject(context))))
 
@@ -175,13 +173,13 @@ or that the library does not have, are told while you type"""
 
 
 def chosen(target: bpy.types.Object):
-    """The picked key moment, else the selected span; InputError where there is not one of them."""
+    """Find the selected key moment, else the selected span. Raises InputError unless there is exactly one."""
     moments = [moment for moment in lanes.moments(target) if moment.selected]
     spans = selected_spans(target)
     if moments:
         return moments[0]
     if len(spans) != 1:
-        found = f"no key moment is picked and {len(spans)} spans are selected"
+        found = f"no key moment and {len(spans)} spans are selected"
         raise InputError(subject_name(target), found, "one of them", "click the name of a key moment, or one strip")
     return spans[0]
 
@@ -193,17 +191,16 @@ def _said(words: str, placed):
 
 
 class BEYOND_MOCAP_OT_read_words(Verb, bpy.types.Operator):
-    """Lay the active player's strips anew from the words of the text chosen in step 2, or of the file where there is no
-text. Strips and key moments that are there now are replaced"""
+    """Replace the active player's strips and key moments by the labels of the text or file chosen in step 2"""
 
     bl_idname = "beyond_mocap.read_words"
-    bl_label = "Words from Text or File"
-    needs = ("Import tracking, and choose a file or text with words in step 2 first",
+    bl_label = "Read Labels"
+    needs = ("Import tracking, and choose a file or text with labels in step 2 first",
              lambda context: (player := active_player(context.scene.beyond_mocap)) is not None
              and (player.annotation_text is not None or bool(player.annotation_file)))
 
     def do(self, context):
-        """Read all of it, then lay the strips."""
+        """Read all labels, then write the strips."""
         settings = context.scene.beyond_mocap
         player = active_player(settings)
         timeline = strips.written_words(player, settings.rate, tracks.read_track(settings, player))
@@ -213,20 +210,19 @@ text. Strips and key moments that are there now are replaced"""
 
 
 class BEYOND_MOCAP_OT_words_to_text(TimelineVerb, bpy.types.Operator):
-    """Write what the strips and key moments say into a text of this file, to be read or changed in the Text Editor. It
-becomes the player's text in step 2"""
+    """Write the strips and key moments to a text for the Text Editor, which becomes the player's text in step 2"""
 
     bl_idname = "beyond_mocap.words_to_text"
-    bl_label = "Words to Text"
+    bl_label = "Labels to Text"
 
     def do(self, context):
-        """Into the player's text, where there is one, else a new one."""
+        """Write to the player's text, or to a new one."""
         target = timeline_subject(context)
         words = format_timeline(lanes.read(target, subject_name(target)))
         player = None if active_clip(context) else active_player(context.scene.beyond_mocap)
         text = player.annotation_text if player else None
         if text is None or text.library is not None:
-            text = bpy.data.texts.new(f"{subject_name(target)} words")
+            text = bpy.data.texts.new(f"{subject_name(target)} labels")
         text.clear()
         text.write(words)
         if player:
@@ -235,18 +231,17 @@ becomes the player's text in step 2"""
 
 
 class BEYOND_MOCAP_OT_export_words(TimelineVerb, ExportHelper, bpy.types.Operator):
-    """Write what the strips and key moments say into a file, a line each: 'START END words' and 'TIME words',
-seconds"""
+    """Write the strips and key moments to a file, one line each: 'START END labels' or 'TIME labels', in seconds"""
 
     bl_idname = "beyond_mocap.export_words"
-    bl_label = "Export Words"
+    bl_label = "Export Labels"
     bl_options = {"REGISTER"}
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
         if not self.filepath:
-            raise InputError("export", "no file given", "a place to write", "choose one")
+            raise InputError("export", "no file is chosen", "a file to write", "choose one")
         target = timeline_subject(context)
         words = format_timeline(lanes.read(target, subject_name(target)))
         with open(bpy.path.abspath(self.filepath), "w", encoding="utf-8", newline="\n") as file:
@@ -255,21 +250,21 @@ seconds"""
 
 
 class BEYOND_MOCAP_OT_import_words(ImportVerb, bpy.types.Operator):
-    """Import a text of words ('START END words', 'TIME words') as strips: of the active player, or of the library's
-clip whose armature is active. Strips that are there are replaced"""
+    """Import a text file of labels ('START END labels', 'TIME labels') in place of the strips of the active player, or
+of the library clip whose armature is active"""
 
     bl_idname = "beyond_mocap.import_words"
-    bl_label = "Import Words"
+    bl_label = "Import Labels"
     bl_options = {"REGISTER", "UNDO"}
     filename_ext = ".txt"
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
-    needs = ("Import tracking first: words belong to a player",
+    needs = ("Import tracking first: labels belong to a player",
              lambda context: bool(recordings.shown_clip(context.object))
              or active_player(context.scene.beyond_mocap) is not None)
 
     def do(self, context):
-        """Read the file, then lay the strips."""
-        path = self.chosen_one("one text of words")
+        """Read the file, then write the strips."""
+        path = self.chosen_one("one text file of labels")
         settings, rig = context.scene.beyond_mocap, context.object
         if recordings.shown_clip(rig):
             motion, _ = recordings.read_recording(settings, recordings.shown_clip(rig), rig[recordings.FOLDER])
@@ -285,15 +280,15 @@ clip whose armature is active. Strips that are there are replaced"""
 
 
 class BEYOND_MOCAP_FH_words(bpy.types.FileHandler):
-    """Texts of words dropped into a view"""
+    """Text files of labels dropped into a view"""
 
     bl_idname = "BEYOND_MOCAP_FH_words"
-    bl_label = "Words of the active player or clip"
+    bl_label = "Labels (Text File)"
     bl_import_operator = "beyond_mocap.import_words"
     bl_file_extensions = ".txt"
 
     @classmethod
     def poll_drop(cls, context):
-        """Where there is somebody whose words they are."""
+        """Return whether there is a target for the labels."""
         where = context.area is not None and context.area.type in {"VIEW_3D", "NLA_EDITOR", "DOPESHEET_EDITOR"}
         return where and BEYOND_MOCAP_OT_import_words.poll(context)

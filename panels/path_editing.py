@@ -1,4 +1,4 @@
-"""Path editing: a motion rides a curve. What rides what, how it follows, its figures, how it is looked at."""
+"""Path editing: the armature, its curve, how the motion follows it, its figures, cameras and overlays."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from .tab import Step, figures, paragraph, section, split
 OVERLAYS = {"path_source": "CURVE_PATH", "path_new": "CURVE_NCURVE", "path_trackers": "EMPTY_SINGLE_ARROW",
             "path_residuals": "TRACKING_REFINE_BACKWARDS", "path_ghost": "GHOST_ENABLED"}
 CAMERAS = (("ABOVE", "Above"), ("SIDE", "Side"), ("QUARTER", "Quarter"), ("BEHIND", "Behind"))
-LOOKED = "beyond_mocap_path_camera"  # custom property of our cameras: which one it is
+LOOKED = "beyond_mocap_path_camera"  # custom property of the extension's cameras: which one it is
 NUDGES = (
     ("LEFT", "TRIA_LEFT"), ("RIGHT", "TRIA_RIGHT"), ("FORTH", "TRIA_UP"), ("BACK", "TRIA_DOWN"), ("UP", "SORT_DESC"),
     ("DOWN", "SORT_ASC"),
 )
-WORSE = {  # what each frame does
-    "path": "What the body is off its path turns with the path, seen from above: what one wants",
-    "tangent": "The whole tangent: a hill tips the body over, and where the path is steep it lies down",
-    "absolute": "Offsets are not turned with the path: in a bend the sway of the steps points the wrong way",
+WORSE = {  # the effect of each frame
+    "path": "Offsets turn with the path, seen from above: recommended",
+    "tangent": "Offsets turn with the full tangent: the body tilts on hills and lies flat on steep paths",
+    "absolute": "Offsets do not turn with the path: in a bend the sway of the steps has the wrong direction",
 }
 
-FIGURES = (  # name, path in the figures, factor, form, unit; what is aimed for: a number, a path of the recording's
-    # own, or that where it is more than a number
-    ("Way", "metres", 1.0, "{:.1f}", " m", None),
+FIGURES = (  # name, key path in the figures, factor, format, unit; target: a number, the key path of the recording's
+    # own figure, or the larger of both
+    ("Length", "metres", 1.0, "{:.1f}", " m", None),
     ("Time", "seconds", 1.0, "{:.1f}", " s", None),
-    ("Off the path", "root_error_m.mean", 100.0, "{:.2f}", " cm", ("root_error_own_m.mean", 0.005)),
-    ("Speed off", "kept_speed.path.p95", 100.0, "{:.2f}", " %", 0.01),
-    ("Feet slide", "skate.contact_cm_s", 1.0, "{:.1f}", " cm/s", "skate.source_contact_cm_s"),
-    ("Not planted", "skate.before_contact_cm_s", 1.0, "{:.1f}", " cm/s", None),
-    ("Slide a step", "skate.stance_mm_median", 1.0, "{:.1f}", " mm", 5.0),
-    ("Feet moved", "foot_correction_m.p95", 100.0, "{:.1f}", " cm", 0.10),
-    ("Legs short", "ik_miss_share", 100.0, "{:.1f}", " %", 0.0),
-    ("Hardest seam", "seam_jerk.max", 1.0, "{:.2f}", " x", 1.3),
+    ("Distance to path", "root_error_m.mean", 100.0, "{:.2f}", " cm", ("root_error_own_m.mean", 0.005)),
+    ("Speed error", "kept_speed.path.p95", 100.0, "{:.2f}", " %", 0.01),
+    ("Foot slide", "skate.contact_cm_s", 1.0, "{:.1f}", " cm/s", "skate.source_contact_cm_s"),
+    ("Slide unplanted", "skate.before_contact_cm_s", 1.0, "{:.1f}", " cm/s", None),
+    ("Slide per step", "skate.stance_mm_median", 1.0, "{:.1f}", " mm", 5.0),
+    ("Foot correction", "foot_correction_m.p95", 100.0, "{:.1f}", " cm", 0.10),
+    ("Feet out of reach", "ik_miss_share", 100.0, "{:.1f}", " %", 0.0),
+    ("Worst transition", "seam_jerk.max", 1.0, "{:.2f}", " x", 1.3),
 )
-SLACK = 1.02  # of an aim: what the table's last digit does not show
+SLACK = 1.02  # factor on a target: a difference that the displayed digits do not show
 
 
 class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
-    """The armature that is meant, its curve, and how the one follows the other."""
+    """The armature, its curve, and how its motion follows the curve."""
 
     bl_label = "Path Editing"
     bl_order = 7
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """From what rides what down to how it is looked at."""
+        """Draw the armature, its path, its figures, cameras and overlays."""
         layout, body = self.layout, subject(context)
         if body is None:
             paragraph(layout, "Select an armature with a motion", "INFO")
@@ -60,7 +60,7 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
             who(layout, body, ride)
             if ride.on:
                 section(layout, "path_curve", "New Curve", lambda opened: new_curve(opened, context.scene.beyond_mocap))
-                section(layout, "path_following", "How It Follows", lambda opened: following(opened, ride))
+                section(layout, "path_following", "Path Following", lambda opened: following(opened, ride))
                 section(layout, "path_body", "Body", lambda opened: own_body(opened, ride))
                 if told := figure_lines(ride.figures):
                     section(layout, "path_figures", "Figures", lambda opened: figures(opened, told))
@@ -69,7 +69,7 @@ class BEYOND_MOCAP_PT_path(Step, bpy.types.Panel):
 
 
 def subject(context) -> bpy.types.Object | None:
-    """The active armature; who rides the active curve; else the active player's body."""
+    """Find the active armature, the armature on the active curve, or else the active player's body."""
     active = context.view_layer.objects.active
     if active is not None and active.type == "ARMATURE":
         return active
@@ -81,16 +81,16 @@ def subject(context) -> bpy.types.Object | None:
 
 
 def who(layout, body, ride) -> None:
-    """What rides what, and the way in and out."""
-    layout.label(text=f"{body.name} rides" if ride.on else body.name, icon="ARMATURE_DATA")
-    layout.prop(ride, "curve", text="", placeholder="A curve fitted to its motion")
+    """Draw the armature, its curve and the buttons to start, apply and revert."""
+    layout.label(text=f"{body.name} on Path" if ride.on else body.name, icon="ARMATURE_DATA")
+    layout.prop(ride, "curve", text="", placeholder="Curve fitted to its motion")
     row = layout.row(align=True)
     row.scale_y = 1.3
     if not ride.on:
         row.operator("beyond_mocap.edit_path", icon="CURVE_BEZCURVE")
     else:
-        row.operator("beyond_mocap.bake_path", text="Keep", icon="CHECKMARK")
-        row.operator("beyond_mocap.leave_path", text="Leave", icon="X")
+        row.operator("beyond_mocap.bake_path", text="Apply", icon="CHECKMARK")
+        row.operator("beyond_mocap.leave_path", text="Revert", icon="X")
         row = layout.row(align=True)
         row.prop(ride, "live", toggle=True, icon="PLAY")
         row.operator("beyond_mocap.update_path", text="Update", icon="FILE_REFRESH")
@@ -99,7 +99,7 @@ def who(layout, body, ride) -> None:
 
 
 def new_curve(layout, settings) -> None:
-    """A new curve, and of what kind."""
+    """Draw the settings and buttons of a new curve."""
     column = split(layout)
     for name in ("curve_kind", "curve_points", "curve_degree"):
         if name != "curve_degree" or settings.curve_kind == "NURBS":
@@ -112,7 +112,7 @@ def new_curve(layout, settings) -> None:
 
 
 def following(layout, ride) -> None:
-    """How the motion follows its path."""
+    """Draw how the motion follows its path."""
     column = split(layout)
     column.prop(ride, "fit")
     if ride.fit == "polynomial":
@@ -125,7 +125,7 @@ def following(layout, ride) -> None:
 
 
 def own_body(layout, ride) -> None:
-    """What the body does about it."""
+    """Draw what the body does on the path."""
     column = split(layout)
     for name in ("plant", "lean", "slopes", "ground"):
         column.prop(ride, name)
@@ -133,13 +133,13 @@ def own_body(layout, ride) -> None:
 
 
 def paper(layout, ride) -> None:
-    """The other ways to keep what the body is off its path, and why one does not want them."""
+    """Draw the alternatives for the frame of the offsets, with their effects."""
     split(layout).prop(ride, "frame")
     paragraph(layout, WORSE[ride.frame], "INFO")
 
 
 def looking(layout, context) -> None:
-    """Four cameras; the step by which control points go, and the ways."""
+    """Draw the four cameras, and the step and directions of nudging."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.path_cameras", icon="VIEW_CAMERA")
     row, camera = column.row(align=True), context.scene.camera
@@ -153,7 +153,7 @@ def looking(layout, context) -> None:
 
 
 def overlays(layout, view) -> None:
-    """What is drawn of riders."""
+    """Draw the switches of the path overlays."""
     grid = layout.grid_flow(columns=2, even_columns=True, align=True)
     grid.active = view.show
     for name, icon in OVERLAYS.items():
@@ -162,7 +162,7 @@ def overlays(layout, view) -> None:
 
 @lru_cache(maxsize=64)
 def figure_lines(figures: str) -> str:
-    """The lines of figures as JSON text; "" where there are none. Kept, since panels ask at every redraw."""
+    """Describe figures given as JSON text, "" without any; cached, since panels ask at every redraw."""
     try:
         table = json.loads(figures) if figures else {}
     except ValueError:
@@ -180,7 +180,7 @@ def figure_lines(figures: str) -> str:
 
 
 def _most(table: Mapping, aim) -> float | None:
-    """What is aimed for, see FIGURES."""
+    """Compute the target of a figure, see FIGURES."""
     if isinstance(aim, tuple):
         own = _figure(table, aim[0])
         return max(own, aim[1]) if own is not None else aim[1]

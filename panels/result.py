@@ -1,4 +1,4 @@
-"""Results: what is shown, accepted or discarded, and how good it is."""
+"""Results: previews to apply or revert, and their quality."""
 
 from __future__ import annotations
 
@@ -7,23 +7,23 @@ import bpy
 from ..scene.core.settings import active_player
 from .tab import Step, figures, paragraph, part, wrapped
 
-STATES = {"NONE": ("Nothing is shown", "BLANK1"),
-          "PREVIEW": ("Preview: not kept yet", "HIDE_OFF"),
-          "ACCEPTED": ("Accepted", "CHECKMARK")}
-MENDS = {  # what the button says that brings a player up to date
+STATES = {"NONE": ("Not Shown", "BLANK1"),
+          "PREVIEW": ("Preview", "HIDE_OFF"),
+          "ACCEPTED": ("Applied", "CHECKMARK")}
+MENDS = {  # label and icon of the button that updates a player
     "update": ("Update", "FILE_REFRESH"),
     "build_library": ("Build Library", "ASSET_MANAGER"),
 }
 
 
 class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
-    """Accept or discard; what else could be shown; what is out of date."""
+    """Apply or revert; alternatives; what is out of date."""
 
     bl_label = "4  Result"
     bl_order = 4
 
     def draw(self, context):
-        """State, buttons, what is made."""
+        """Draw the state, the buttons and the options."""
         layout, settings = self.layout, context.scene.beyond_mocap
         player = active_player(settings)
         if player is not None and player.take:
@@ -48,7 +48,7 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
             body.operator("beyond_mocap.add_stage", icon="VIEW_CAMERA")
 
     def out_of_date(self, context, player):
-        """The box that says what is out of date, with the button that mends it."""
+        """Draw what is out of date, with the button that updates it."""
         scene = context.scene.session_uid
         told = context.window_manager.beyond_mocap_stale
         entry = next((entry for entry in told if entry.name == player.name and entry.scene == scene), None)
@@ -56,7 +56,7 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
             return
         box = self.layout.box().column(align=True)
         if entry.lines:
-            box.label(text="Out of date", icon="ERROR")
+            box.label(text="Out of Date", icon="ERROR")
         for line in entry.lines.splitlines():
             paragraph(box, line, "DOT")
         for line in entry.notes.splitlines():
@@ -68,7 +68,7 @@ class BEYOND_MOCAP_PT_result(Step, bpy.types.Panel):
                 button.player = player.name
 
     def others(self, player):
-        """Other solutions: of a stretch, of the whole take."""
+        """Draw the alternatives: of a range of time, of the whole take."""
         column = self.layout.column(align=True)
         column.operator("beyond_mocap.resynthesize_stretch", icon="UV_SYNC_SELECT")
         column.operator("beyond_mocap.variants", icon="RENDERLAYERS")
@@ -95,12 +95,12 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context):
-        """There is a take to tell about."""
+        """Return whether the active player has figures."""
         player = active_player(context.scene.beyond_mocap)
         return player is not None and bool(player.quality)
 
     def draw(self, context):
-        """What the player's settings keep."""
+        """Draw the stored figures, key moments and warnings."""
         layout, player = self.layout, active_player(context.scene.beyond_mocap)
         layout.label(text=player.name, icon="ARMATURE_DATA")
         lines = player.warnings.splitlines()
@@ -120,7 +120,7 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
             figures(body, player.quality)
 
     def jump(self, layout, player, text: str, seconds: str, icon: str) -> None:
-        """A line over as many rows as it takes; the first is a button where the line has times."""
+        """Draw a line over several rows; the first row is a button if the line has times."""
         if not seconds:
             paragraph(layout, text, icon)
             return
@@ -135,8 +135,8 @@ class BEYOND_MOCAP_PT_quality(Step, bpy.types.Panel):
             column.label(text=line, icon="BLANK1")
 
     def why(self, layout, text: str) -> None:
-        """The prepared lines about the piece at the playhead."""
+        """Draw the reasons for the piece at the playhead."""
         column = layout.column(align=True)
         column.scale_y = 0.85
-        for number, line in enumerate(text.splitlines() or ("No take of this session here",)):
+        for number, line in enumerate(text.splitlines() or ("No take of this session",)):
             column.label(text=line, icon="SEQUENCE" if number == 0 and text else "BLANK1")

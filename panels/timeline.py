@@ -1,4 +1,4 @@
-"""The tab "Beyond Mocap" in the NLA editor and the dope sheet: the timeline of words of one player."""
+"""The tab "Beyond Mocap" in the NLA editor and the dope sheet: the labels of one player."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ MOST = 60  # key moments that the list shows
 
 
 class BEYOND_MOCAP_MT_choose_player(bpy.types.Menu):
-    """Whose strips are shown."""
+    """Choose the player whose strips are shown."""
 
     bl_label = "Player"
 
     def draw(self, context):
-        """A line for each player."""
+        """Draw a line for each player."""
         for player in context.scene.beyond_mocap.players:
             icon = "LAYER_ACTIVE" if player == active_player(context.scene.beyond_mocap) else "BLANK1"
             self.layout.operator("beyond_mocap.choose_player", text=player.name, icon=icon).player = player.name
 
 
 class Timeline:
-    """What all editors of time show."""
+    """The content that all time editors share."""
 
     bl_region_type = "UI"
     bl_category = "Beyond Mocap"
     bl_label = "Timeline"
 
     def draw(self, context):
-        """Whose it is, key moments, what is wrong, tools."""
+        """Draw the player, key moments, problems and tools."""
         layout, settings = self.layout, context.scene.beyond_mocap
         target, player = written_on(context), active_player(settings)
         clip = target is not None and not target.beyond_mocap_dot.player
         row = layout.row(align=True)
-        row.menu("BEYOND_MOCAP_MT_choose_player", text=target.name if clip else player.name if player else "No player")
+        row.menu("BEYOND_MOCAP_MT_choose_player", text=target.name if clip else player.name if player else "No Player")
         row.operator("beyond_mocap.choose_player", text="", icon="RESTRICT_SELECT_OFF")
         row.prop(settings, "show_moment_names", text="", icon="SYNTAX_OFF")
         if target is None:
@@ -46,7 +46,7 @@ class Timeline:
         self.tools(layout)
 
     def moments(self, layout, target):
-        """Key moments by frame; a click goes there and picks it."""
+        """Draw the key moments by frame; a click goes there and selects the moment."""
         found = sorted(shown_moments(target), key=lambda one: one[0])
         box = layout.column(align=True)
         for frame, name, strip, index, picked in found[:MOST]:
@@ -60,13 +60,13 @@ class Timeline:
         row.operator("beyond_mocap.delete_moment", text="Delete", icon="REMOVE")
 
     def problems(self, layout, context, target):
-        """What is wrong with the words, as it was found when they were last changed."""
+        """Draw the problems of the labels, as of their last change."""
         for one in context.window_manager.beyond_mocap_problems.lines:
             if one.target == target.name:
                 paragraph(layout, f"{one.frame}: {one.line}", "ERROR")
 
     def tools(self, layout):
-        """Words of what is selected, spans, text form."""
+        """Draw the tools for labels, spans and the text form."""
         layout.operator("beyond_mocap.annotate", icon="SYNTAX_ON")
         column = layout.column(align=True)
         column.operator("beyond_mocap.edit_words", icon="GREASEPENCIL")
@@ -84,19 +84,19 @@ class Timeline:
 
 
 class BEYOND_MOCAP_PT_timeline(Timeline, bpy.types.Panel):
-    """In the NLA editor."""
+    """The tab in the NLA editor."""
 
     bl_space_type = "NLA_EDITOR"
 
 
 class BEYOND_MOCAP_PT_timeline_dope_sheet(Timeline, bpy.types.Panel):
-    """In the dope sheet."""
+    """The tab in the dope sheet."""
 
     bl_space_type = "DOPESHEET_EDITOR"
 
 
 def written_on(context) -> bpy.types.Object | None:
-    """The object whose strips are meant: a clip that is being annotated, else the active player's dot."""
+    """Find the target object: a clip that is being annotated, else the active player's dot."""
     active = context.view_layer.objects.active
     if active is not None and active.beyond_mocap_lanes.clock and not active.beyond_mocap_dot.player:
         return active
@@ -106,7 +106,7 @@ def written_on(context) -> bpy.types.Object | None:
 
 
 def shown_moments(target):
-    """(frame, name, strip, index, picked) of the markers that an object's strips show."""
+    """Iterate over (frame, name, strip, index, is_selected) of the visible markers of an object's strips."""
     for track in target.animation_data.nla_tracks if target.animation_data else ():
         for strip in track.strips:
             low, high = strip.action_frame_start - 0.5, strip.action_frame_end + 0.5

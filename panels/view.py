@@ -1,4 +1,4 @@
-"""What is drawn over the 3D view: one switch for each overlay, and the error curves."""
+"""Overlays of the 3D view: a switch for each of them, and the error curves."""
 
 from __future__ import annotations
 

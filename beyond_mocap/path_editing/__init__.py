@@ -1,1 +1,1 @@
-"""A recorded motion on another path."""
+"""Path editing: a recorded motion on another path."""

@@ -1,10 +1,10 @@
-"""Bodies on several paths keep apart: some wait a little before they set out, some go round each other.
+"""Collision avoidance: bodies on several paths wait a little at their start, or take a detour around each other.
 
-A change costs seconds of waiting and metres gone sideways. The earliest collision is taken, and every way to mend it
-that one of the two (or both, each by half, as people do who meet head on) could take is tried by the least amount that
-mends it; the few best sets of changes so far are kept and gone on with until none has a collision left that can be
-mended. At last every change is made as small as the others allow. All of it is arithmetic on the same numbers in the
-same order: the same bodies get the same changes.
+A change costs seconds of waiting and metres to the side. The search takes the earliest collision and tries every remedy
+that one of the two bodies (or both, each by half, as people do who meet head on) could apply, by the smallest amount
+that resolves it. The few best sets of changes are kept and continued until none has a collision left that can be
+resolved. Finally every change is reduced as much as the others allow. All of it is arithmetic on the same numbers in
+the same order: the same bodies get the same changes.
 """
 
 from __future__ import annotations
@@ -16,26 +16,34 @@ import numpy as np
 from .collisions import DISTANCE, HEIGHT, Collision, collisions, collisions_at, least_gaps
 from .detour import RISE, Change, Follower, gentle_width
 
-_SPARE = 0.012  # metres kept beyond the distance: bodies move in curves between the search's own times
-_RATE, _FINER = 25.0, 3  # times per second at which the search looks; at the end so many times as often
-_KEPT, _MANY = (4, 2), 8  # sets of changes gone on with; fewer from so many collisions on
-_TRIED = 4  # ways to mend a collision, the cheapest of them
-_AROUND = 1.0  # seconds around a collision in which what mends it must be clear
-_AMOUNTS, _FINE = 16, 0.003  # how many amounts are tried at once; seconds and metres
-_EVEN, _LEFT = 0.5, 0.25  # two small detours are rather taken than a large one; people keep to the right
+_SPARE = 0.012  # metres kept beyond the distance: bodies move in curves between the samples of the search
+_RATE, _FINER = 25.0, 3  # samples per second of the search; factor on it for the final check
+_KEPT, _MANY = (4, 2), 8  # sets of changes kept; the second number from so many collisions on
+_TRIED = 4  # remedies tried for a collision, those with the lowest cost
+_AROUND = 1.0  # seconds around a collision that a remedy must keep clear
+_AMOUNTS, _FINE = 16, 0.003  # amounts tried at once; seconds or metres added to the smallest that suffices
+_EVEN, _LEFT = 0.5, 0.25  # costs that favour two small detours over a large one, and keeping to the right
 _DETOURS = 2  # of one body in one place
 _TIGHT = 0.3  # a detour on the inside of a bend leaves at least this share of its length
-_BIN, _LAG = 0.5, 0.5  # seconds: how finely it is looked at first who may meet; what detours may cost
-_UNMENDED = 10.0  # what a collision that stays costs
-_SHARES = (0.0, 0.5, 0.75, 0.9)
-_PATIENCE = 3.0  # ways are looked for at most for so many times as many collisions as there were
-_AGAIN = 2  # times that it is gone over where something is left; from what was found it goes on otherwise
+_BIN, _LAG = 0.5, 0.5  # seconds: bins of the first test of who can meet; delay that detours can cause
+_UNMENDED = 10.0  # cost of an unresolved collision
+_SHARES = (0.0, 0.5, 0.75, 0.9)  # of a change, tried when changes are reduced
+_PATIENCE = 3.0  # remedies are searched for at most this many times the initial collisions
+_AGAIN = 2  # rounds of the whole search while collisions are left; each starts from the last result
 
 
 @dataclass(frozen=True)
 class Limits:
-    """distance, height: metres, see `collisions`. delay: most seconds that anybody waits. detour: most metres to the
-    side. delay_cost, detour_cost: of a second of waiting, and of a metre to the side and back."""
+    """Limits and costs of changes.
+
+    Attributes:
+        distance: metres below which two bodies collide, see `collisions`.
+        height: metres of a body.
+        delay: seconds that a body waits at most.
+        detour: metres to the side at most.
+        delay_cost: of a second of waiting.
+        detour_cost: of a metre to the side and back.
+    """
 
     distance: float = DISTANCE
     height: float = HEIGHT
@@ -47,8 +55,13 @@ class Limits:
 
 @dataclass(frozen=True)
 class Resolution:
-    """changes: one for each follower. before: the collisions there were. left: those that could not be mended within
-    the limits, with the numbers of the changed bodies."""
+    """The result of collision avoidance.
+
+    Attributes:
+        changes: one for each follower.
+        before: the initial collisions.
+        unresolved: collisions that remain within the limits, with the numbers of the changed bodies.
+    """
 
     changes: tuple[Change, ...]
     before: tuple[Collision, ...]
@@ -57,27 +70,34 @@ class Resolution:
 
 @dataclass(frozen=True)
 class _State:
-    """A set of changes, the collisions it leaves, and for which of them no way was found."""
+    """A set of changes, the collisions that it leaves, and those of them without a remedy."""
 
     changes: tuple[Change, ...]
     collisions: tuple[Collision, ...]
     given_up: frozenset = frozenset()
 
     def open(self):
-        """The earliest collision still to be mended, or None."""
+        """Find the earliest collision still to be resolved, or None."""
         return next((collision for collision in self.collisions if self.key(collision) not in self.given_up), None)
 
     def key(self, collision):
-        """Says that nothing has changed since no way was found."""
+        """Build a key of a collision and the changes of both bodies: equal as long as the search for remedies would
+        be.
+        """
         first, second = collision.first, collision.second
         return first, second, self.changes[first], self.changes[second], round(collision.time, 1)
 
 
 def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None) -> Resolution:
-    """The changes that keep these bodies apart, least in all.
+    """Find the changes that keep these bodies apart, with the lowest total cost.
 
-    changes: what has been asked of them already and shall stay at least (one Change each). Bodies without a path stay
-    as they are; collisions among those alone are nobody's concern here."""
+    Args:
+        followers: the bodies; those without a path stay as they are, and collisions among them alone are ignored.
+        limits: limits and costs.
+        changes: one `PathChange` for each body that must hold at least; None for none.
+    Returns:
+        The changes, the initial and the unresolved collisions.
+    """
     search = _Search(followers, limits)
     state = search.begin(tuple(changes or (Change(),) * len(followers)))
     before = state.collisions
@@ -90,7 +110,7 @@ def resolved(followers: list[Follower], limits: Limits = Limits(), changes=None)
 
 
 def _mended(search: "_Search", state: "_State") -> "_State":
-    """The best state found from this one on."""
+    """Find the best state reachable from this one, by a beam search."""
     states, rounds = [state], int(_PATIENCE * len(state.collisions)) + 20
     kept = _KEPT[len(state.collisions) >= _MANY]
     for _ in range(rounds):
@@ -102,7 +122,7 @@ def _mended(search: "_Search", state: "_State") -> "_State":
 
 
 class _Search:
-    """The bodies on one clock, and what is tried with them."""
+    """The bodies on one clock, with caches of all that is tried."""
 
     def __init__(self, followers, limits):
         self.followers, self.limits = followers, limits
@@ -111,29 +131,29 @@ class _Search:
         end = max(follower.times[-1] for follower in followers) + limits.delay
         self.clock = np.linspace(begin, end, max(int(np.ceil((end - begin) * _RATE)), 1) + 1)
         self.places, self.costs, self.found, self.known = {}, {}, {}, {}
-        self.patience = 0  # for how many collisions ways are looked for
+        self.patience = 0  # limit of collisions for which remedies are searched
         self.may_meet = _may_meet(self)
 
     def begin(self, changes) -> _State:
-        """Where the search sets out."""
+        """Build the first state."""
         everyone = tuple(range(len(changes)))
         return _State(changes, self.after(changes, (), everyone))
 
     def track(self, who, change):
-        """Places (T, 3) of a changed body on the clock."""
+        """Compute the places (T, 3) m of a changed body on the clock."""
         if (who, change) not in self.places:
             self.places[who, change] = self.followers[who].at(self.clock, change)
         return self.places[who, change]
 
     def after(self, changes, collisions, changed):
-        """All collisions, by time, where those of the `changed` bodies are to be found anew."""
+        """Update the collisions, by time, for bodies whose changes are new."""
         found = [collision for collision in collisions if not {collision.first, collision.second} & set(changed)]
         for rank, who in enumerate(changed):
             found += self.met(who, changes, changed[:rank])
         return tuple(sorted(found, key=lambda collision: (collision.start, collision.first, collision.second)))
 
     def left(self, changes):
-        """The collisions that changes leave, looked at more finely than while searching."""
+        """Find the collisions that changes leave, at a higher rate than the search's."""
         times = np.linspace(self.clock[0], self.clock[-1], _FINER * (len(self.clock) - 1) + 1)
         places = np.stack([follower.at(times, change) for follower, change in zip(self.followers, changes)])
         fixed = [follower.path is None for follower in self.followers]
@@ -141,7 +161,7 @@ class _Search:
         return tuple(collision for collision in found if not (fixed[collision.first] and fixed[collision.second]))
 
     def met(self, who, changes, without):
-        """The collisions of one body, but for those with the bodies `without`."""
+        """Find the collisions of one body, except those with the bodies `without`."""
         known = self.known.setdefault((who, changes[who]), {})
         others = [other for other in self.may_meet[who] if other not in without]
         new = [other for other in others if (other, changes[other]) not in known]
@@ -157,17 +177,17 @@ class _Search:
         return [hit for other in others for hit in known[other, changes[other]]]
 
     def score(self, state):
-        """What a state costs, with what its collisions will cost at least."""
+        """Compute the cost of a state, with a lower bound for the cost of its collisions; ties: fewer collisions."""
         to_come = sum(_UNMENDED if state.key(collision) in state.given_up else self.least(collision)
                       for collision in state.collisions)
         return sum(map(self.cost, range(len(state.changes)), state.changes)) + to_come, len(state.collisions)
 
     def least(self, collision):
-        """What mending a collision costs, seen from afar."""
+        """Compute a lower bound for the cost of resolving a collision."""
         return self.limits.detour_cost * (self.wanted - collision.gap)
 
     def cost(self, who, change):
-        """What a change costs: waiting, and metres to the side and back."""
+        """Compute the cost of a change: waiting, and metres to the side and back."""
         if (who, change) not in self.costs:
             limits, cost = self.limits, self.limits.delay_cost * change.delay
             if change.detours:
@@ -181,7 +201,7 @@ class _Search:
         return self.costs[who, change]
 
     def children(self, state):
-        """The states after the earliest collision is mended in each possible way; the state where none is open."""
+        """Build the states after each remedy for the earliest collision; the state itself if none is open."""
         collision = state.open()
         if collision is None:
             return [state]
@@ -197,7 +217,7 @@ class _Search:
         return children or [replace(state, given_up=state.given_up | {key})]
 
     def ways(self, state, collision):
-        """Each way to mend a collision: number of a body -> its change."""
+        """List the remedies of a collision with the lowest costs: number of a body -> its change."""
         pair = [who for who in (collision.first, collision.second) if self.followers[who].path is not None]
         found = [self.wait(state, collision, who) for who in pair]
         found += [self.round(state, collision, {who: side}) for who in pair for side in (-1.0, 1.0)]
@@ -208,13 +228,13 @@ class _Search:
         return sorted(found, key=lambda way: self.more(state, way))[:_TRIED]
 
     def more(self, state, way):
-        """What a way costs beyond what is spent."""
+        """Compute the additional cost of a remedy."""
         return sum(self.cost(who, change) - self.cost(who, state.changes[who]) for who, change in way.items())
 
     def wait(self, state, collision, who):
-        """The shortest wait of one body that mends a collision."""
+        """Find the shortest wait of one body that resolves a collision."""
         if collision.start <= self.clock[0]:
-            return None  # where they begin they are too near
+            return None  # they are too near at their very start
         now, other = state.changes[who], collision.second if who == collision.first else collision.first
         times = self.around(collision)
         standing = self.followers[other].at(times, state.changes[other])
@@ -229,7 +249,7 @@ class _Search:
         return self.least_way(state, collision, gap, way, self.limits.delay - now.delay)
 
     def round(self, state, collision, sides):
-        """The smallest detour, to these sides and equal for all who make one, that mends a collision."""
+        """Find the smallest detour that resolves a collision, to given sides and equal for all bodies that make one."""
         covers = {who: self.cover(state, collision, who) for who in sides}
         if any(_crowded(state.changes[who], covers[who]) for who in sides):
             return None
@@ -253,9 +273,12 @@ class _Search:
         return least if least and all(self.possible(who, change) for who, change in least.items()) else None
 
     def least_way(self, state, collision, gap, way, most):
-        """The way of the least amount that keeps both apart around a collision; gap(amounts (A,)) -> metres (A,)."""
+        """Find the remedy of the smallest amount that keeps both apart around a collision.
+
+        gap: maps amounts (A,) to metres (A,); remedy: maps an amount to changes; most: largest amount.
+        """
         low, high = 0.0, most
-        for _ in range(2):
+        for _ in range(2):  # a grid, then a finer one below its first amount that suffices
             amounts = low + (high - low) * np.arange(1, _AMOUNTS + 1) / _AMOUNTS
             enough = np.flatnonzero(gap(amounts) >= self.wanted)
             if not len(enough):
@@ -267,24 +290,24 @@ class _Search:
         return None
 
     def around(self, collision):
-        """Times (T,) around a collision in which what mends it must be clear."""
+        """Select the times (T,) around a collision that a remedy must keep clear."""
         first = np.searchsorted(self.clock, collision.start - _AROUND)
         last = np.searchsorted(self.clock, collision.end + _AROUND + self.limits.delay)
         return self.clock[max(first - 1, 0) : last + 1]
 
     def gap(self, first, second):
-        """Metres (A,) between bodies (A, T, 3) when they are nearest."""
+        """Compute the smallest gap (A,) m between bodies (A, T, 3)."""
         return least_gaps(first, second, self.limits.distance, self.limits.height)
 
     def clear(self, state, collision, changed):
-        """Whether the two are apart around the time of a collision, with these changes."""
+        """Return whether the two bodies are apart around the time of a collision, with these changes."""
         times = self.around(collision)
         first, second = (self.followers[who].at(times, changed.get(who, state.changes[who]))[None]
                          for who in (collision.first, collision.second))
         return self.gap(first, second)[0] >= self.wanted
 
     def cover(self, state, collision, who):
-        """(first, last): metres along its path as it was between which a body has to be aside."""
+        """Compute (first, last): metres along the original path between which a body must keep aside."""
         follower, change = self.followers[who], state.changes[who]
         first, last = (follower.arc_at(time, change) for time in (collision.start, collision.end))
         if last < first and follower.way.closed:
@@ -292,8 +315,11 @@ class _Search:
         return first, max(first, last)
 
     def train(self, who, cover, offset):
-        """Detours that keep a body aside all along: each begins to come back where the next begins to leave, and
-        together they are one long one. offset: a number or an array, and so are theirs."""
+        """Build the detours that keep a body aside all along the cover.
+
+        Each begins to return where the next begins to leave, so that together they are one long detour. offset: a
+        number or an array, and so are the numbers of the detours.
+        """
         first, last = cover
         width = np.maximum(gentle_width(offset, self.followers[who].speed), (last - first) / 3.0)
         more = np.maximum(np.ceil((last - first - (1.0 - 2.0 * RISE) * width) / ((1.0 - RISE) * width)), 0.0)
@@ -302,7 +328,7 @@ class _Search:
         return tuple((begin + number * step, width, offset * (number <= more)) for number in numbers)
 
     def possible(self, who, change):
-        """Whether a change keeps to the limits and leaves no loop in a bend."""
+        """Return whether a change is within the limits and leaves no loop in a bend."""
         way = self.followers[who].way
         aside = way.aside(way.arc, change.detours)
         tight = (1.0 - way.bend * aside < _TIGHT) & (np.abs(aside) > 0.05)
@@ -310,7 +336,7 @@ class _Search:
         return waits and goes and not tight.any()
 
     def smaller(self, state):
-        """The state with each change as small as the others allow: left out, or a part of it."""
+        """Reduce each change as much as the others allow: drop it, or scale it."""
         for who, change in enumerate(state.changes):
             for part in sorted({(width, offset) for _, width, offset in change.detours}, key=str):
                 state = self.scaled(state, who, lambda now, share, part=part: _with_share(now, part, share))
@@ -319,7 +345,7 @@ class _Search:
         return state
 
     def scaled(self, state, who, shared):
-        """The state with the least share of a part of one body's change that brings no collision."""
+        """Choose the smallest share of a part of one body's change that adds no collision."""
         for share in _SHARES:
             changes = list(state.changes)
             changes[who] = shared(state.changes[who], share)
@@ -331,35 +357,39 @@ class _Search:
 
 
 def _crowded(change, cover):
-    """Whether a body with this change makes detours enough between (first, last) metres."""
+    """Return whether a body with this change has enough detours between (first, last) metres."""
     there = [detour for detour in change.detours if abs(detour[0] - 0.5 * sum(cover)) < 0.5 * detour[1]]
     return len(there) >= 2 * _DETOURS
 
 
 def _with_share(change, part, share):
-    """A change with those of its detours that have this (width, offset) made smaller."""
+    """Scale those detours of a change that have this (width, offset)."""
     kept = [(middle, width, round(offset * share, 4) if (width, offset) == part else offset)
             for middle, width, offset in change.detours]
     return replace(change, detours=tuple(detour for detour in kept if detour[2] != 0.0))
 
 
 def _rounded(detours):
-    """Detours as plain numbers, to a tenth of a millimetre."""
+    """Round detours to plain numbers, to a tenth of a millimetre."""
     return tuple(tuple(round(float(number), 4) for number in detour) for detour in detours)
 
 
 def _trouble(state):
-    """How many collisions a state has, and how deep they are."""
+    """Count the collisions of a state, with their depth for ties."""
     return len(state.collisions), -round(sum(collision.gap for collision in state.collisions), 6)
 
 
 def _may_meet(search):
-    """For each body the others with which changes within the limits could bring it together, each with the steps (M,)
-    of the clock in which they could; two of which neither can give way are nobody's concern."""
+    """Find, for each body, the others that changes within the limits could bring close.
+
+    Returns for each body the others with the steps (M,) of the clock in which they could meet. Pairs of which neither
+    can yield are left out.
+    """
     limits, followers = search.limits, search.followers
     stride = max(int(round(_BIN * _RATE)), 1)
     begins = np.arange(0, len(search.clock) - 1, stride)
     tracks = np.stack([search.track(who, Change())[:, :2] for who in range(len(followers))])
+    # Each bin of `stride` samples is a disc: its middle sample, and the radius `around` of the movement within the bin.
     middle = tracks[:, np.minimum(begins + stride // 2, len(search.clock) - 1)]
     apart = [np.abs(tracks[:, np.minimum(begins + step, len(search.clock) - 1)] - middle) for step in range(stride + 1)]
     around = np.linalg.norm(np.max(apart, axis=0), axis=2)
@@ -370,7 +400,7 @@ def _may_meet(search):
         off = middle[:, None, :rest] - middle[None, :, shift:]
         reach = search.wanted + 2.0 * limits.detour + around[:, None, :rest] + around[None, :, shift:]
         near = np.einsum("ijbk,ijbk->ijb", off, off) <= reach**2
-        for both in range(shift, late + 1):  # one waited by `both`, the other by both - shift
+        for both in range(shift, late + 1):  # one body waits for `both` bins, the other for both - shift
             last = min(len(begins), rest + both)
             meet[:, :, both:last] |= near[:, :, : last - both]
     meet |= meet.transpose(1, 0, 2)

@@ -1,9 +1,9 @@
-"""Bodies that come too near each other: who, when, where and how near, exactly, between the frames too.
+"""Collisions of bodies: which, when, where and how close, exactly, between frames too.
 
 A body is an upright capsule on its place on the ground: a segment of `height` less its own thickness, with `distance`
-as the least gap between two such segments. So bodies on two floors, or one on a bridge, do not meet. Between two frames
-each body moves in a straight line; the gap is then a convex function of time, made of at most three pieces (one below
-the other, level, above), and its least value and the times at which it crosses `distance` are those of quadratics.
+as the least gap between two such segments. So bodies on two floors, or one on a bridge, do not collide. Between two
+frames each body moves in a straight line; the gap is then a convex function of time with at most three pieces (one body
+below the other, level, above), and its minimum and the times at which it crosses `distance` are those of quadratics.
 """
 
 from __future__ import annotations
@@ -13,18 +13,25 @@ from dataclasses import dataclass
 import numpy as np
 
 HEIGHT = 1.8
-"""Metres of a standing body."""
+"""Metres of an upright body."""
 DISTANCE = 0.6
-"""Metres between two bodies' middles at which their shoulders begin to touch."""
-_JUMP = 15.0  # m/s: nobody runs like that; such a step is a motion that starts again somewhere else
+"""Metres between the middles of two bodies at which their shoulders begin to touch."""
+_JUMP = 15.0  # m/s: faster than anyone runs; such a step is a motion that restarts elsewhere
 
 
 @dataclass(frozen=True, kw_only=True)
 class Collision:
-    """Two bodies nearer than the distance asked for, without a break.
+    """Two bodies nearer than the required distance, without interruption.
 
-    first, second: numbers of the bodies, first < second. start, end: seconds. time: when they are nearest. gap: metres
-    between them then. place (3,): metres, the middle between both then."""
+    Attributes:
+        first: number of one body.
+        second: number of the other, first < second.
+        start: seconds.
+        end: seconds.
+        time: seconds, when they are nearest.
+        gap: metres between them then.
+        place: (3,) metres, the middle between both then, world frame.
+    """
 
     first: int
     second: int
@@ -36,9 +43,16 @@ class Collision:
 
 
 def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE, height: float = HEIGHT) -> list:
-    """All collisions, by time.
+    """Find all collisions, by time.
 
-    times (T,): seconds, rising. places (N, T, 3): metres on the ground."""
+    Args:
+        times: (T,) seconds, rising.
+        places: (N, T, 3) metres on the ground, world frame.
+        distance: metres below which two bodies collide.
+        height: metres of a body.
+    Returns:
+        List of `Collision`.
+    """
     found = []
     for first in range(len(places) - 1):
         found += collisions_of(first, range(first + 1, len(places)), times, places=places, distance=distance,
@@ -47,7 +61,18 @@ def collisions(times: np.ndarray, places: np.ndarray, distance: float = DISTANCE
 
 
 def collisions_of(one: int, others, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
-    """The collisions of body `one` with these others; arrays as in `collisions`."""
+    """Find the collisions of one body with others.
+
+    Args:
+        one: number of the body.
+        others: numbers of the others.
+        times: (T,) seconds, rising.
+        places: (N, T, 3) metres, world frame.
+        distance: metres below which two bodies collide.
+        height: metres of a body.
+    Returns:
+        List of `Collision`.
+    """
     others = np.asarray([other for other in others if other != one], dtype=int)
     if len(times) < 2 or not len(others):
         return []
@@ -56,10 +81,23 @@ def collisions_of(one: int, others, times, places, distance: float = DISTANCE, h
 
 
 def collisions_at(one: int, others, steps, times, places, distance: float = DISTANCE, height: float = HEIGHT) -> list:
-    """The collisions of body `one` with others (M,) within steps (M,), those of each other together and rising."""
+    """Find the collisions of one body with others within given steps.
+
+    Args:
+        one: number of the body.
+        others: (M,) numbers of the others, equal ones together.
+        steps: (M,) step s from frame s to s + 1, rising for each body.
+        times: (T,) seconds, rising.
+        places: (N, T, 3) metres, world frame.
+        distance: metres below which two bodies collide.
+        height: metres of a body.
+    Returns:
+        List of `Collision`.
+    """
     off = places[others, steps] - places[one, steps]
     move = places[others, steps + 1] - places[one, steps + 1] - off
     reach = distance + np.sqrt(move[:, 0] ** 2 + move[:, 1] ** 2)
+    # A quick test first: only pairs that their relative movement within the step can bring together.
     near = np.flatnonzero(off[:, 0] ** 2 + off[:, 1] ** 2 <= reach**2)
     others, steps, off, move = others[near], steps[near], off[near], move[near]
     goes = ~(_jumps(one, steps, times, places) | _jumps(others, steps, times, places))
@@ -75,13 +113,13 @@ def collisions_at(one: int, others, steps, times, places, distance: float = DIST
 
 
 def _jumps(bodies, steps, times, places):
-    """Which steps (M,) of these bodies are no movement."""
+    """Return which steps (M,) of these bodies are jumps, not movement."""
     step = places[bodies, steps + 1] - places[bodies, steps]
     return np.einsum("mk,mk->m", step, step) > (_JUMP * (times[steps + 1] - times[steps])) ** 2
 
 
 def _joined(pair, steps, enter, leave, nearest, gap, times, places):
-    """The collisions of one pair: those of its steps joined where one goes on in the next."""
+    """Join the steps of one pair to collisions, where one continues in the next step."""
     found = []
     breaks = np.flatnonzero((np.diff(steps) > 1) | (leave[:-1] < 1.0) | (enter[1:] > 0.0)) + 1
     for part in np.split(np.arange(len(steps)), breaks):
@@ -97,10 +135,17 @@ def _joined(pair, steps, enter, leave, nearest, gap, times, places):
 
 
 def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
-    """Within steps: shares (M,) of the step at which the gap falls below and rises above `distance`, at which it is
-    least, and the least gap (M,) metres. Where it stays above, the first two mean nothing.
+    """Compute when two bodies are nearest within a step, and when they come and leave.
 
-    off, move (M, 3): offset of one body against the other at the start, and its change. span: metres of the segments.
+    Args:
+        off: (M, 3) metres, offset of one body from the other at the start of the step.
+        move: (M, 3) metres, change of the offset during the step.
+        distance: metres below which two bodies collide.
+        span: metres of the vertical segments.
+    Returns:
+        Shares (M,) of the step at which the gap falls below and rises above `distance` (meaningless if it stays above),
+        at
+        which it is smallest, and the smallest gap (M,) metres.
     """
     if not len(off) or max(np.abs(off[:, 2]).max(), np.abs(off[:, 2] + move[:, 2]).max()) <= span:  # all on one level
         level, always = np.array([1.0, 1.0, 0.0]), np.zeros(len(off))
@@ -108,6 +153,7 @@ def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
         return enter, leave, nearest, gap
     enter, leave = np.full(len(off), np.inf), np.full(len(off), -np.inf)
     nearest, gap = np.zeros(len(off)), np.full(len(off), np.inf)
+    # Three pieces: segments overlap in height (no vertical gap), the other body above, the other body below.
     for low, high, shift in ((-span, span, None), (span, np.inf, span), (-np.inf, -span, -span)):
         begin, end = _while_between(off[:, 2], move[:, 2], low, high)
         level = np.array([1.0, 1.0, 0.0 if shift is None else 1.0])
@@ -120,7 +166,16 @@ def gaps(off: np.ndarray, move: np.ndarray, distance: float, span: float):
 
 
 def least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT) -> np.ndarray:
-    """Metres (A,) between pairs of bodies (A, T, 3) when they are nearest; one side may have A = 1."""
+    """Compute the smallest gap between pairs of bodies.
+
+    Args:
+        first: (A, T, 3) metres, or (1, T, 3).
+        second: (A, T, 3) metres, or (1, T, 3).
+        distance: metres below which two bodies collide.
+        height: metres of a body.
+    Returns:
+        (A,) metres.
+    """
     off = second - first
     move = np.diff(off, axis=1).reshape(-1, 3)
     gap = gaps(off[:, :-1].reshape(-1, 3), move, distance, max(height - distance, 0.0))[3]
@@ -128,7 +183,9 @@ def least_gaps(first, second, distance: float = DISTANCE, height: float = HEIGHT
 
 
 def _while_between(value, change, low, high):
-    """The shares (M,), (M,) of a step between which value + share * change lies in [low, high]; empty: first > last."""
+    """Find the shares (M,), (M,) of a step between which value + share * change lies in [low, high]; empty: first >
+    last.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         first, last = (low - value) / change, (high - value) / change
     still = change == 0.0
@@ -140,12 +197,13 @@ def _while_between(value, change, low, high):
 
 
 def _quadratic(start, change, begin, end, distance):
-    """Least length of start + share * change for shares in [begin, end], and where it is below `distance`."""
+    """Minimize |start + share * change| for shares in [begin, end], and find where it is below `distance`."""
     a, b = np.einsum("mk,mk->m", change, change), np.einsum("mk,mk->m", start, change)
     empty = begin > end
     at = np.divide(-b, a, out=np.zeros_like(a), where=a > 0)
     at = np.where(empty, 0.0, np.minimum(np.maximum(at, begin), end))
     least = np.linalg.norm(start + at[:, None] * change, axis=1)
+    # The discriminant of |start + share * change|^2 = distance^2.
     room = b**2 - a * (np.einsum("mk,mk->m", start, start) - distance**2)
     root = np.sqrt(np.maximum(room, 0.0))
     into, out = (np.divide(-b + sign * root, a, out=np.full_like(a, sign * np.inf), where=a > 0) for sign in (-1, 1))

@@ -1,16 +1,15 @@
-"""A motion made to go on: a stretch of it shown again and again until a path is filled (Path editing §3.2.4).
+"""Cycling: a stretch of the motion is repeated until a path is filled (Path editing §3.2.4).
 
-The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion begins
-as recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as it takes, and ends as
-recorded. How often, and over which loop, is chosen so that the recorded end falls on the end of the path, with all
-strides made longer or shorter: by at most MOST_SCALE where the motion ends in another way than it goes on (it stops, it
-kicks), by at most KEPT_SCALE where its end is a step like the others. Where that cannot be, it is cut while it goes on
-steadily.
+The document jumps from the last frame to the first (eq. 4.5) and finds the result poor (§5.3). Here the motion starts
+as recorded, jumps back at the end of a loop whose two ends look alike (`loops`), as often as needed, and ends as
+recorded. The loops and their number are chosen so that the recorded end falls on the end of the path, with all strides
+scaled: by at most MOST_SCALE where the motion ends differently from how it continues (it stops, it kicks), by at most
+KEPT_SCALE where its end is a step like the others. Where that is impossible, the motion is cut while it moves steadily.
 
-At each jump one stretch gives way to the other by a quintic for FADE_SECONDS on either side. Rotations, the place
-beside the path and the height go over from the one's to the other's; of the way along the path the speed is mixed, not
-the place. Where a recording ends within a fade, the difference of both at its end is carried on and dies away with what
-is left of it. A sole that only one stretch sets down does not stand while the fade moves it.
+At each jump the two stretches are blended by a quintic for FADE_SECONDS on either side. Rotations, the place beside the
+path and the height are blended themselves; along the path the speed is blended, not the place. Where a recording ends
+within a fade, the difference of both at its end is extrapolated and decays with the remaining fade. A foot that only
+one stretch has in contact is not in contact while the fade moves it.
 """
 
 from __future__ import annotations
@@ -26,30 +25,37 @@ from .loops import Loop, find_loops, smooth_speed
 from .path_frame import Residuals
 
 FADE_SECONDS = 0.2
-"""Half a fade, at most; a short loop is faded over its own length."""
+"""Half a fade, at most; a short loop has a fade of its own length."""
 MOST_SCALE, KEPT_SCALE = 0.05, 0.009
-"""Shares by which strides are made longer or shorter so that the motion's end falls on the path's: where that end is
-worth it, and where the speed is to be kept."""
+"""Shares by which strides are scaled at most so that the motion's end falls on the path's: where that end matters, and
+where the speed is to be kept."""
 MOST_FRAMES = 108_000
 """An hour at 30 frames per second."""
 SAME_LENGTH = 1e-3
-"""Metres that path and motion may differ and count as of one length."""
+"""Metres by which path and motion may differ and still count as equally long."""
 SEEN = 0.35
-"""How unlike a loop's ends may be without being told, and its motion's end to count as a step like the others."""
-_ALSO_GOOD = (1.6, 0.02)  # loops that cost at most so many times the best one's, and metres more, may be taken too
-_KEEPS, _ALIKE = 3.0, 0.3  # how much strides of another length, and loops whose ends differ, count against seams
-_CREEPS = 0.2  # m/s below which a motion stays where it is
-_OTHERS = 3  # times that another loop than the main one is run through, at most
+"""Relative distance of a loop's ends above which the user gets a warning, and below which the end of the motion counts
+as a step like the others."""
+_ALSO_GOOD = (1.6, 0.02)  # cost limit of further loops: a factor on the lowest cost, and metres more
+_KEEPS, _ALIKE = 3.0, 0.3  # weights of scaled strides, and of loops whose ends differ, against transitions
+_CREEPS = 0.2  # m/s below which a motion stays in place
+_OTHERS = 3  # repeats of a second loop beside the main one, at most
 
-_OWN_SHARE = 0.98  # a sole that stands in one stretch alone stands while that one has at least this share
-_FURTHER = 0.08  # seconds after which a difference that is carried on no longer grows
-_SLOPE_SECONDS = 0.03
+_OWN_SHARE = 0.98  # a sole in contact in one stretch alone stays in contact while that one has at least this share
+_FURTHER = 0.08  # seconds after which an extrapolated difference no longer grows
+_SLOPE_SECONDS = 0.03  # over which the slope of an extrapolated difference is measured
 
 
 @dataclass(frozen=True, eq=False)
 class Cycled:
-    """residuals: the motion that goes on; seams (S,): its frames that are the first after a jump; scale: how much
-    longer its strides are than recorded; told: lines for the user."""
+    """A motion that is repeated to a given length.
+
+    Attributes:
+        residuals: of the repeated motion.
+        transitions: (S,) its first frames after a jump.
+        scale: length of its strides over those recorded.
+        messages: for the user.
+    """
 
     residuals: Residuals
     seams: np.ndarray
@@ -58,12 +64,19 @@ class Cycled:
 
 
 def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None = None) -> Cycled:
-    """The motion repeated until it is `length` metres long; it is returned as it is where it is so long already.
+    """Repeat a motion until it has a given length; a motion that is long enough is returned as it is.
 
-    loops: what `find_loops` found, for callers that keep it. Raises InputError for a motion that has no loop and for a
-    length that is no length."""
+    Args:
+        residuals: the motion relative to its own path.
+        length: metres of the new path.
+        loops: result of `find_loops`, for callers that keep it.
+    Returns:
+        The repeated motion, its transitions and messages.
+    Raises:
+        InputError: if the motion has no loop, or if the length is not a positive number.
+    """
     if not np.isfinite(length) or length <= 0.0:
-        raise InputError("path", f"{length:g} m long", "a length above 0", "draw a longer path")
+        raise InputError("path", f"is {length:g} m long", "a length above 0", "draw a longer path")
     own = float(residuals.step.sum())
     if abs(own - length) <= SAME_LENGTH:
         return Cycled(residuals, np.zeros(0, int))
@@ -78,7 +91,7 @@ def cycled(residuals: Residuals, length: float, loops: tuple[Loop, ...] | None =
 
 
 def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: float) -> Cycled:
-    """The motion with as many jumps as `wanted` metres take."""
+    """Repeat the motion with as many jumps as `target` metres need."""
     own = float(residuals.step.sum())
     length = min(wanted, _longest(residuals, loops[0], own))
     exact = _exact_end(loops, own, length, most)
@@ -87,11 +100,12 @@ def _filled(residuals: Residuals, loops: tuple[Loop, ...], wanted: float, most: 
     told = _seen(jumps)
     if length < wanted:
         minutes = len(shown) / residuals.fps / 60.0
-        ends = f"the motion ends after {minutes:.0f} minutes and {length:.0f} m of it"
-        told += (f"the path is {wanted:.0f} m long: {ends}",)
+        ends = f"the motion ends after {minutes:.0f} minutes and {length:.0f} m"
+        told += (f"the path of {wanted:.0f} m is too long: {ends}",)
     if exact:
         scale = length / float(shown.step.sum())
         return Cycled(_scaled(shown, scale), seams, scale, (*told, *_other_strides(scale)))
+    # No exact end: cut at the nearest frame, with strides scaled if that is hardly visible.
     arc = np.cumsum(shown.step)
     count = int(np.argmin(np.abs(arc - length))) + 1
     scale = length / float(arc[count - 1])
@@ -105,39 +119,38 @@ def _scaled(residuals: Residuals, scale: float) -> Residuals:
     return residuals if scale == 1.0 else residuals.changed(step=residuals.step * scale)
 
 
-_NEXT_STEP = "switch cycling off, take a clip that walks or runs for two strides, or shorten the path"
+_NEXT_STEP = "switch cycling off, choose a clip that walks or runs for two strides, or shorten the path"
 
 
 def _why_not(residuals: Residuals) -> str:
     metres, seconds = float(residuals.step.sum()), len(residuals) / residuals.fps
     if metres < _CREEPS * seconds or not (smooth_speed(residuals) > _CREEPS).any():
-        return f"the motion stays where it is ({metres:.2f} m in {seconds:.1f} s)"
-    return f"no stretch of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
+        return f"the motion stays in place ({metres:.2f} m in {seconds:.1f} s)"
+    return f"no part of the motion ({metres:.2f} m, {seconds:.1f} s) can be repeated"
 
 
 def _seen(loops: tuple[Loop, ...]) -> tuple[str, ...]:
     unlike = max(loop.unlike for loop in loops)
     if unlike <= SEEN:
         return ()
-    return (f"no two strides of the motion are alike: where it is repeated, poses are {100 * unlike:.0f} % apart",)
+    return (f"no two strides of the motion are alike: at its transitions, poses differ by {100 * unlike:.0f} %",)
 
 
 def _other_strides(scale: float) -> tuple[str, ...]:
     if abs(scale - 1.0) <= KEPT_SCALE + 1e-3:
         return ()
     word = "longer" if scale > 1.0 else "shorter"
-    return (f"strides are {100 * abs(scale - 1.0):.1f} % {word}, so that the motion ends where the path does",)
+    return (f"strides are {100 * abs(scale - 1.0):.1f} % {word}, so that the motion ends with the path",)
 
 
 def _cut(loop: Loop) -> tuple[str, ...]:
     if loop.ending <= SEEN:
         return ()
-    return ("no number of loops brings the motion's own end to the path's end: it is cut there",)
+    return ("no repetition of loops ends with the recorded end at the path's end: the motion is cut there",)
 
 
 def _good(residuals: Residuals, loops: tuple[Loop, ...]) -> tuple[Loop, ...]:
-    """The loops that are nearly as good as the best, without those that lead nowhere, as long as they are faded
-    over."""
+    """Select the loops nearly as good as the best, without those that do not move, with their length after fading."""
     loops = tuple(loop for loop in loops if loop.metres > 0.1)
     most = _ALSO_GOOD[0] * loops[0].cost + _ALSO_GOOD[1] if loops else 0.0
     return tuple(_as_long_as_faded(residuals, loop) for loop in loops if loop.cost <= most)
@@ -150,11 +163,13 @@ def _as_long_as_faded(residuals: Residuals, loop: Loop) -> Loop:
 
 
 def _exact_end(loops: tuple[Loop, ...], own: float, length: float, most: float) -> tuple[Loop, ...]:
-    """The jumps with which the motion's own end falls on the path's; () where no strides scaled by at most `most` do
-    it."""
+    """Find the jumps with which the motion's own end falls on the path's; () if strides would scale by more than
+    `most`.
+    """
     best, least = (), np.inf
     for main in loops:
         for other in loops:
+            # `other` runs `times` times; then `main` fills the rest, rounded down or up.
             for times in range(_OTHERS + 1 if other is not main else 1):
                 more = length - own - times * other.metres
                 around = more / main.metres
@@ -170,14 +185,14 @@ def _exact_end(loops: tuple[Loop, ...], own: float, length: float, most: float) 
 
 
 def _rating(jumps: tuple[Loop, ...], scale: float, best: float) -> float:
-    """What speaks against a plan: strides of another length, many jumps, jumps that are seen."""
+    """Rate a plan, lower is better: scaled strides, many jumps and visible jumps count against it."""
     strides = sum(loop.strides for loop in jumps)
     worse = sum(loop.cost for loop in jumps) / len(jumps) / max(best, 1e-6) - 1.0
     return _KEEPS * abs(scale - 1.0) / MOST_SCALE + len(jumps) / max(strides, 1.0) + _ALIKE * worse
 
 
 def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...]:
-    """`main` run through `count` times and `other` `times` times, in an order that can be shown; () where none can."""
+    """Order `count` jumps of `main` and `times` of `other` so that they can be played; () if no order can."""
     if not count or not times:
         return (main,) * count + (other,) * times
     for first, second in (((main, count), (other, times)), ((other, times), (main, count))):
@@ -187,27 +202,31 @@ def _ordered(main: Loop, count: int, other: Loop, times: int) -> tuple[Loop, ...
 
 
 def _steady(residuals: Residuals, loops: tuple[Loop, ...], own: float, length: float) -> tuple[Loop, ...]:
-    """One loop until the path's end falls into it or before it, so that nobody is cut in the middle of stopping; of a
-    motion that ends as it goes on, until it is long enough."""
+    """Choose one loop, repeated until the path's end falls into it or before it, so that no stop is cut in the middle.
+
+    A motion that ends as it continues is repeated until it is long enough.
+    """
     loop = min(loops, key=lambda loop: _rating((loop,), 1.0, loops[0].cost))
     outro = float(residuals.step[loop.end + 1 :].sum()) if loop.ending > SEEN else 0.0
     return (loop,) * max(int(np.ceil((length - own + outro) / loop.metres)), 1)
 
 
 def _longest(residuals: Residuals, loop: Loop, own: float) -> float:
-    """Metres that MOST_FRAMES are good for."""
+    """Compute the metres that MOST_FRAMES cover."""
     return own + max((MOST_FRAMES - len(residuals)) // len(loop), 1) * loop.metres
 
 
 def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, np.ndarray]:
-    """The motion with all jumps made and faded over, and its seams (S,).
+    """Apply all jumps with their fades; return the motion and its transitions (S,).
 
-    Every jump over one loop is faded alike, so that it is worked out once: the frames are taken from the motion with
-    one fade for each loop behind it."""
+    Each jump over the same loop has the same fade, so that it is computed once: frames come from the motion, followed
+    by one fade for each kind of loop.
+    """
     count, kinds = len(residuals), list(dict.fromkeys(jumps))
     reach = _reach(residuals, jumps)
     begins = [0] + [loop.start for loop in jumps]
     ends = [loop.end for loop in jumps] + [count]
+    # `taken` (N,) is the row of each output frame: 0 .. count - 1 in the motion, then 2 * reach rows of each fade.
     taken = np.concatenate([np.arange(a, b) for a, b in zip(begins, ends)])
     seams = np.cumsum([b - a for a, b in zip(begins, ends)])[:-1]
     parts = {name: [values] for name, values in list_rows(residuals).items()}
@@ -224,26 +243,46 @@ def _jumped(residuals: Residuals, jumps: tuple[Loop, ...]) -> tuple[Residuals, n
 
 
 def _reach(residuals: Residuals, jumps: tuple[Loop, ...]) -> int:
-    """Frames of a fade on either side, so many that no two fades meet."""
+    """Compute the frames of a fade on either side, so that no two fades overlap."""
     pieces = [jumps[0].end] + [b.end - a.start for a, b in zip(jumps[:-1], jumps[1:])]
     pieces.append(len(residuals) - jumps[-1].start)
     return max(min(int(round(FADE_SECONDS * residuals.fps)), min(pieces) // 2), 1)
 
 
 def list_rows(residuals: Residuals) -> dict[str, np.ndarray]:
-    """Every array of a motion that can be mixed: all but the numbers of its frames."""
+    """List every array of a motion that can be blended: all but its frame numbers.
+
+    Args:
+        residuals: the motion.
+    Returns:
+        Arrays by field name, one row a frame.
+    """
     return {name: values for name, values in residuals.arrays.items() if name != "frames"}
 
 
 def jump_window(loop: Loop, reach: int) -> np.ndarray:
-    """The frames (2 * reach,) that are shown around a jump where nothing is faded."""
+    """Compute the unblended frames around a jump.
+
+    Args:
+        loop: the loop that the jump repeats.
+        reach: frames on either side.
+    Returns:
+        (2 * reach,) frames: those before the loop's end, then those from its start.
+    """
     around = np.arange(-reach, reach)
     return np.where(around < 0, loop.end, loop.start) + around
 
 
 def fade_jump(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndarray]:
-    """All `list_rows` of the 2 * reach frames around a jump, faded from the frames around the loop's end to those
-    around its start."""
+    """Blend the frames around a jump, from those around the loop's end to those around its start.
+
+    Args:
+        residuals: the motion.
+        loop: the loop that the jump repeats.
+        reach: frames on either side.
+    Returns:
+        Arrays by field name as in `list_rows`, (2 * reach, ...).
+    """
     both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
     after, come = both.around >= 0, both.come
     shown = list_rows(residuals)
@@ -259,8 +298,18 @@ def fade_jump(residuals: Residuals, loop: Loop, reach: int) -> dict[str, np.ndar
 
 
 def fade_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
-    """(2 * reach,) metres since the frame before, such that the body's speed along the path is the mean of both
-    stretches' speeds although its place in the frame goes over from the one's to the other's."""
+    """Compute the path length of each frame of a fade.
+
+    The body's speed along the path is the weighted mean of both stretches' speeds, although its place in the moving
+    frame is blended from one to the other.
+
+    Args:
+        residuals: the motion.
+        loop: the loop that the jump repeats.
+        reach: frames on either side.
+    Returns:
+        (2 * reach,) metres since the frame before.
+    """
     both = _Stretches(len(residuals), loop, np.arange(-reach, reach), residuals.fps)
     along = residuals.place[:, 0]
     body = _since_before(residuals.step) + _since_before(np.diff(along, prepend=along[0]))
@@ -270,12 +319,14 @@ def fade_steps(residuals: Residuals, loop: Loop, reach: int) -> np.ndarray:
 
 
 def _since_before(values: np.ndarray) -> np.ndarray:
-    """Changes (T,) since the frame before, the first frame's guessed from the second's."""
+    """Compute the changes (T,) since the frame before; the first repeats the second."""
     return np.concatenate([values[1:2], values[1:]])
 
 
 def _turned(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Rotation vectors (..., 3) radians from rotations (..., 4) to others, as seen from the former."""
+    """Compute rotation vectors (..., 3) radians from rotations `before` to `after` (..., 4), in the frame of the
+    former.
+    """
     return quaternion.to_rotation_vector(quaternion.multiply(quaternion.inverse(before), after))
 
 
@@ -284,15 +335,23 @@ def _mixed(a: np.ndarray, b: np.ndarray, share_of_b: np.ndarray) -> np.ndarray:
 
 
 def _standing(a: np.ndarray, b: np.ndarray, come: np.ndarray) -> np.ndarray:
-    """Soles (R, 2, 2) that stand in a fade: those that do in both stretches, and in one while it hardly gives way."""
+    """Blend soles in contact (R, 2, 2): those of both stretches, and those of one while it has nearly the whole
+    share.
+    """
     come = come[:, None, None]
     return (a & b) | (a & (come <= 1.0 - _OWN_SHARE)) | (b & (come >= _OWN_SHARE))
 
 
 @dataclass(frozen=True, eq=False)
 class _Stretches:
-    """The two stretches around a jump, each as far as the motion goes and carried on from there: around (R,) frames
-    from the jump on."""
+    """The two stretches around a jump, each extrapolated beyond the recording.
+
+    Attributes:
+        count: frames of the motion.
+        loop: the loop that the jump repeats.
+        around: (R,) frames relative to the jump.
+        fps: frames per second.
+    """
 
     count: int
     loop: Loop
@@ -301,32 +360,35 @@ class _Stretches:
 
     @property
     def through(self) -> np.ndarray:
-        """(R,) how far the fade has come, from 0 to 1."""
+        """(R,) progress of the fade, from 0 to 1."""
         return (self.around - self.around[0]) / len(self.around)
 
     @property
     def come(self) -> np.ndarray:
-        """(R,) share of the beginning stretch."""
+        """(R,) share of the incoming stretch, which starts the loop."""
         after = self.around >= 0
         given = fade_share(self.through, after)
         return np.where(after, 1.0 - given, given)
 
     @property
     def _known(self) -> tuple[int, int]:
-        """First and last frame from the jump on of which both stretches have a recording."""
+        """First and last frame, relative to the jump, for which both stretches are recorded."""
         return -min(self.loop.start, -int(self.around[0])), min(self.count - 1 - self.loop.end, int(self.around[-1]))
 
     def _places(self) -> tuple[np.ndarray, ...]:
-        """Frames (R,) of the ending and of the beginning stretch, held at the motion's own ends."""
+        """Compute the frames (R,) of the outgoing and of the incoming stretch, limited to the motion."""
         return tuple(np.clip(at + self.around, 0, self.count - 1) for at in (self.loop.end, self.loop.start))
 
     def _carried(self, apart: np.ndarray, ending: np.ndarray, beginning: np.ndarray) -> np.ndarray:
-        """Differences (R, ...) of both stretches with those beyond the recording carried on from its end; ending and
-        beginning (S, ...): what they change by in each of the S frames before and after the jump."""
+        """Extrapolate the differences (R, ...) of both stretches beyond the recording.
+
+        ending, beginning (S, ...): by how much they change in each of the S frames before and after the jump.
+        """
         first, last = (edge - int(self.around[0]) for edge in self._known)
         over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
         whole, slope = last - first >= over, ending.mean(axis=0) - beginning.mean(axis=0)
         out, longest = apart.copy(), _FURTHER * self.fps
+        # Both sides: `edge` is the last recorded row, `inner` the one for the slope, `beyond` the rows to fill.
         for edge, inner, beyond in ((first, min(first + over, last), np.arange(first)),
                                     (last, max(last - over, first), np.arange(last + 1, len(apart)))):
             near = (apart[edge] - apart[inner]) / (edge - inner) if whole else slope
@@ -336,12 +398,14 @@ class _Stretches:
 
     @property
     def _changes(self) -> tuple[np.ndarray, np.ndarray]:
-        """The last frames (S,) before the jump and the first after it, whose changes are known without the other's."""
+        """The last frames (S,) before the jump and the first after it, whose changes are known without the other
+        stretch.
+        """
         over = max(int(round(_SLOPE_SECONDS * self.fps)), 1)
         return self.loop.end - np.arange(over), self.loop.start + 1 + np.arange(over)
 
     def values(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values (R, ...) of the ending and of the beginning stretch."""
+        """Sample values (R, ...) of the outgoing and of the incoming stretch."""
         ending, beginning = (np.asarray(values[at], dtype=float) for at in self._places())
         if self._known == (self.around[0], self.around[-1]):
             return ending, beginning
@@ -352,7 +416,7 @@ class _Stretches:
         return ending, beginning
 
     def rotations(self, rotations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rotations (R, J, 4) of the ending and of the beginning stretch."""
+        """Sample rotations (R, J, 4) of the outgoing and of the incoming stretch."""
         ending, beginning = (rotations[at].copy() for at in self._places())
         if self._known == (self.around[0], self.around[-1]):
             return ending, beginning
@@ -364,7 +428,7 @@ class _Stretches:
         return ending, beginning
 
     def labels(self, standing: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Labels (R, 2, 2) of the ending and of the beginning stretch; where one has no recording, the other's."""
+        """Sample contacts (R, 2, 2) of both stretches; where one has no recording, those of the other."""
         ending, beginning = (standing[at].copy() for at in self._places())
         first, last = (edge - int(self.around[0]) for edge in self._known)
         ending[last + 1 :], beginning[:first] = beginning[last + 1 :], ending[:first]

@@ -1,9 +1,8 @@
-"""Small detours of a path, and a body that follows it, seen from above: where it is when, also if it set out later or
-made a detour.
+"""Local detours of a path, and where a body that follows the path is at a time, with a delay or a detour.
 
-A detour is (arc, width, offset) in metres: where its middle is along the path as it was, how much of the path it takes,
-and how far to the left (right: negative) the path goes at its middle. It rises and falls by the quintic step
-6 q^5 - 15 q^4 + 10 q^3, whose slope and bend vanish at both ends, so that the path stays C2. Detours add up.
+A detour is (arc, width, offset) in metres: its middle along the original path, the length of path that it covers, and
+how far the path moves to the left (right: negative) at the middle. It rises and falls by the quintic step 6 q^5 - 15
+q^4 + 10 q^3, whose slope and curvature vanish at both ends, so that the path stays C2. Detours add up.
 """
 
 from __future__ import annotations
@@ -20,16 +19,23 @@ from ..motion.path.arc_length import ArcLength
 from ..motion.path.path import Path, SplinePath
 
 RISE = 0.4
-"""Share of a detour's width in which it leaves the way, and in which it comes back."""
-_STEP = 0.1  # metres between the places at which a path is taken
-_STEADY = 0.3  # metres over which the way to the side is smoothed: an offset of a corner has no loop
+"""Share of a detour's width in which it leaves the path, and in which it returns to it."""
+_STEP = 0.1  # metres between samples when a path is rebuilt with its detours
+_STEADY = 0.3  # metres over which the lateral direction is smoothed, so that the offset of a corner has no loop
 
-_SPACING = 0.1  # metres between the places at which the path is taken
-_PIECES = 24  # of a detour, when its length is taken
+_SPACING = 0.1  # metres between the samples of a `SampledPath`
+_PIECES = 24  # pieces into which a detour is divided to measure its length
 
 
 def offsets(arc: np.ndarray, detours) -> np.ndarray:
-    """Metres (..., N) to the left at these arc lengths (..., N); the numbers of a detour may be arrays (..., 1)."""
+    """Compute the lateral offset of a path with detours.
+
+    Args:
+        arc: (..., N) metres along the original path.
+        detours: (middle, width, offset) of each detour, metres; each number may be an array (..., 1).
+    Returns:
+        (..., N) metres to the left.
+    """
     total = 0.0 * arc
     for middle, width, offset in detours:
         rest = np.minimum(np.maximum((0.5 * width - np.abs(arc - middle)) / (RISE * width), 0.0), 1.0)
@@ -38,23 +44,46 @@ def offsets(arc: np.ndarray, detours) -> np.ndarray:
 
 
 def round_offsets(arc: np.ndarray, detours, length: float) -> np.ndarray:
-    """`offsets` on a closed path of this length: a detour goes on across the place where the path closes."""
+    """Compute the lateral offset on a closed path, where a detour continues across the place at which the path closes.
+
+    Args:
+        arc: (N,) metres along the original path.
+        detours: as in `compute_offsets`.
+        length: metres of the closed path.
+    Returns:
+        (N,) metres to the left.
+    """
     return sum((offsets(arc + shift * length, detours) for shift in (-1.0, 0.0, 1.0)), np.zeros(()))
 
 
 def gentle_width(offset, speed: float):
-    """Metres of path that a detour by `offset` needs for someone at `speed` m/s.
+    """Compute how much of the path a comfortable detour covers.
 
-    Its bends are no tighter than a radius of 4 m, and push sideways by no more than 1.5 m/s^2."""
+    Its curvature stays below that of a radius of 4 m, and its lateral acceleration below 1.5 m/s^2.
+
+    Args:
+        offset: metres to the side, a number or an array.
+        speed: metres per second of the body.
+    Returns:
+        Metres of path, at least 1.5, in the shape of `offset`.
+    """
     bend = min(0.25, 1.5 / max(speed, 0.1) ** 2)
     most = 10.0 / np.sqrt(3.0)  # the quintic step's largest bend
     return np.maximum(1.5, np.sqrt(most * np.abs(offset) / bend) / RISE)
 
 
 def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.ndarray:
-    """Unwrapped yaw (N,) of a line (N, 3) of places `spacing` metres apart, smoothed over a step.
+    """Compute the smoothed heading along a line of evenly spaced places.
 
-    Where the line goes straight up or down it is that of the way before and behind it."""
+    Where the line goes straight up or down, the heading is interpolated from before and after.
+
+    Args:
+        places: (N, 3) metres.
+        spacing: metres between two places.
+        closed: whether the last place is the first one again.
+    Returns:
+        (N,) radians, unwrapped yaw.
+    """
     along = np.gradient(places, axis=0)
     if closed:
         along[0] = along[-1] = 0.5 * (places[1] - places[-2])
@@ -62,12 +91,18 @@ def headings(places: np.ndarray, spacing: float, closed: bool = False) -> np.nda
 
 
 def left_of(heading: np.ndarray) -> np.ndarray:
-    """Unit vectors (N, 3), level, to the left of yaw angles (N,)."""
+    """Compute the horizontal unit vectors to the left of a heading.
+
+    Args:
+        heading: (N,) radians, yaw.
+    Returns:
+        (N, 3) unit vectors.
+    """
     return np.stack([-np.sin(heading), np.cos(heading), np.zeros_like(heading)], axis=-1)
 
 
 def _heading(along, spacing):
-    """Unwrapped yaw (N,) of tangents (N, 3), carried across where they have no level part."""
+    """Compute the unwrapped yaw (N,) of tangents (N, 3), interpolated where they have no horizontal part."""
     level = np.hypot(along[:, 0], along[:, 1]) > 1e-3 * spacing
     if not level.any():
         return np.zeros(len(along))
@@ -76,14 +111,14 @@ def _heading(along, spacing):
 
 
 def _steady(heading, sigma, closed):
-    """Yaw (N,) smoothed by a Gaussian of `sigma` places; closed: the last place is the first one again."""
+    """Smooth a yaw (N,) by a Gaussian of `sigma` samples; closed: the last sample is the first one again."""
     reach = int(np.ceil(3.0 * sigma))
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     count = len(heading)
     if closed and count > reach + 1:
         turn = 2.0 * np.pi * np.round((heading[-1] - heading[0]) / (2.0 * np.pi))
         padded = np.concatenate([heading[-1 - reach : -1] - turn, heading, heading[1 : reach + 1] + turn])
-    else:  # straight on at the ends: point reflection keeps the heading there
+    else:  # point reflection at the ends keeps the heading there
         far = np.minimum(np.arange(1, reach + 1), count - 1)
         before, after = 2 * heading[0] - heading[far[::-1]], 2 * heading[-1] - heading[count - 1 - far]
         padded = np.concatenate([before, heading, after])
@@ -91,13 +126,21 @@ def _steady(heading, sigma, closed):
 
 
 def with_detours(path: Path, detours) -> Path:
-    """The path with these detours [(arc, width, offset)], C2 as before, under the same parameters; see above.
+    """Build the path with its detours, C2 as before and under the same parameters.
 
-    Its ends move where a detour takes them in. Without detours it is `path` itself. InputError where a detour is not
-    three finite numbers, the second positive."""
+    The ends move where a detour includes them. Without detours the result is `path` itself.
+
+    Args:
+        path: the original path.
+        detours: (arc, width, offset) of each detour, metres.
+    Returns:
+        The path with all detours.
+    Raises:
+        InputError: if a detour is not three finite numbers with a positive width.
+    """
     for detour in detours:
         if len(detour) != 3 or not np.isfinite(detour).all() or detour[1] <= 0.0:
-            raise InputError("detour", str(tuple(detour)), "arc, width and offset in metres, the width above 0")
+            raise InputError("detour", str(tuple(detour)), "arc, width and offset in metres, with a width above 0")
     detours = [detour for detour in detours if detour[2] != 0.0]
     length = ArcLength(path)
     if not detours or not length.length:
@@ -112,7 +155,7 @@ def with_detours(path: Path, detours) -> Path:
 
 
 def _parameters(path, length):
-    """Parameters, the path's breaks among them, that are nowhere more than a step apart on the ground."""
+    """Sample the path's parameters, its breaks among them, so that no two are more than _STEP apart."""
     breaks = np.asarray(path.breaks, dtype=float)
     counts = np.maximum(np.ceil(np.diff(length.at(breaks)) / _STEP).astype(int), 1)
     first, share = np.repeat(np.arange(len(counts)), counts), np.concatenate([np.arange(n) / n for n in counts])
@@ -120,14 +163,16 @@ def _parameters(path, length):
 
 
 def _smooth(grid, values, at):
-    """Values (N,) on a grid, between its places by a cubic spline: kinks of the heading would be kinks of the path."""
+    """Interpolate values (N,) on a grid by a cubic spline, since kinks of the heading would become kinks of the
+    path.
+    """
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(grid, values)(at)
 
 
 def _through(parameters, places, closed):
-    """The cubic spline through these places (N, 3); its parameter is theirs."""
+    """Interpolate places (N, 3) by a cubic spline with the given parameters."""
     from scipy.interpolate import make_interp_spline
 
     if closed:
@@ -138,8 +183,12 @@ def _through(parameters, places, closed):
 
 @dataclass(frozen=True)
 class Change:
-    """What is asked of a follower. delay: seconds for which it waits where it begins. detours: ((arc, width, offset),
-    ...) in metres along its path as it was, see `detour`."""
+    """What a follower changes to avoid others.
+
+    Attributes:
+        delay: seconds for which it waits at its start.
+        detours: (arc, width, offset) of each detour, metres along the original path.
+    """
 
     delay: float = 0.0
     detours: tuple[tuple[float, float, float], ...] = ()
@@ -147,11 +196,16 @@ class Change:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Follower:
-    """One body without any change.
+    """One body that follows a path, before any change.
 
-    times (T,): seconds, rising, the same clock for all. places (T, 3): metres on the ground. path: what it follows;
-    None: something that cannot be asked to give way. arc (T,): metres it has gone along the path. by_arc: whether it
-    keeps its speed, so that a detour makes it come later; else it is where its path's parameter says."""
+    Attributes:
+        name: of the body, for messages.
+        times: (T,) seconds, rising, on a clock shared by all bodies.
+        places: (T, 3) metres on the ground, world frame.
+        path: the path that it follows; None for a body that cannot yield.
+        arc: (T,) metres along the path.
+        by_arc: whether it keeps its speed, so that a detour delays it; else the path's parameter gives its place.
+    """
 
     name: str
     times: np.ndarray
@@ -162,7 +216,7 @@ class Follower:
 
     @cached_property
     def way(self) -> "Way":
-        """The path, seen from above."""
+        """The path, sampled and seen from above."""
         return Way(self.path)
 
     @cached_property
@@ -172,14 +226,21 @@ class Follower:
 
     @cached_property
     def speed(self) -> float:
-        """Metres per second along the path, as a rule where it moves."""
+        """Typical metres per second while it moves: the 80th percentile."""
         seconds = np.maximum(np.diff(self.times), 1e-9)
         speeds = np.linalg.norm(np.diff(self.places[:, :2], axis=0), axis=1) / seconds
         moving = speeds[speeds > 0.2]
         return float(np.percentile(moving, 80)) if len(moving) else 0.0
 
     def at(self, times: np.ndarray, change: Change = Change()) -> np.ndarray:
-        """Places (N, 3) at these times (N,); before its first and after its last time it stands."""
+        """Compute the places of the body at given times; before its first and after its last time it stays there.
+
+        Args:
+            times: (N,) seconds.
+            change: its delay and detours.
+        Returns:
+            (N, 3) metres, world frame.
+        """
         times = times - change.delay
         if self.path is None or not change.detours:
             return interpolate(times, self.times, self.places)
@@ -188,9 +249,19 @@ class Follower:
         return beside + self.way.with_detours_at(arc, change.detours, self.by_arc)
 
     def with_more(self, times: np.ndarray, change: Change, train) -> np.ndarray:
-        """Places (A, N, 3) with A trains of more detours: quickly, to a few millimetres. train: detours whose numbers
-        are arrays (A, 1)."""
+        """Compute the places of the body for many variants of additional detours at once.
+
+        Fast, and exact to a few millimetres.
+
+        Args:
+            times: (N,) seconds.
+            change: its delay and detours so far.
+            train: additional detours whose numbers are arrays (A, 1), one row for each variant.
+        Returns:
+            (A, N, 3) metres, world frame.
+        """
         times, way = times - change.delay, self.way
+        # The arc length with the old detours is exact; the length that the new ones add is subtracted to first order.
         arc = way.on_it(np.interp(times, self.times, self.arc), change.detours, self.by_arc)[None]
         old = way.aside(arc, change.detours)
         aside = old + way.aside(arc, train)
@@ -202,13 +273,30 @@ class Follower:
         return places.reshape(shape) + interpolate(times, self.times, self.beside)
 
     def arc_at(self, time: float, change: Change = Change()) -> float:
-        """Metres along the path as it was at a time."""
+        """Compute the metres along the original path at a time.
+
+        Args:
+            time: seconds.
+            change: its delay and detours.
+        Returns:
+            Metres along the original path.
+        """
         arc = np.interp([time - change.delay], self.times, self.arc)
         return float(self.way.on_it(arc, change.detours, self.by_arc)[0])
 
 
 class Way:
-    """A path as places `spacing` apart, with the directions beside it."""
+    """A path sampled at even arc lengths, with the directions to its left.
+
+    Attributes:
+        length: metres of the path.
+        closed: whether its end is its start.
+        tables: cached arc-length tables, by detours.
+        arc: (K,) metres along the path.
+        places: (K, 3) metres, world frame.
+        left: (K, 3) horizontal unit vectors to the left.
+        curvature: (K,) radians per metre, left positive.
+    """
 
     def __init__(self, path: Path):
         length = ArcLength(path)
@@ -221,17 +309,33 @@ class Way:
         self.bend = np.gradient(heading, self.arc) if self.length else np.zeros(1)
 
     def places_at(self, arc: np.ndarray) -> np.ndarray:
-        """Places (N, 3) on the path at arc lengths (N,)."""
+        """Interpolate the places (N, 3) on the path at arc lengths (N,)."""
         return interpolate(self._within(arc, self.length), self.arc, self.places)
 
     def with_detours_at(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
-        """Places (N, 3) on the path with detours; arc as in `on_it`."""
+        """Compute the places on the path with detours.
+
+        Args:
+            arc: (N,) metres, as in `to_original_arc`.
+            detours: (arc, width, offset) of each detour, metres.
+            by_arc: whether `arc` is measured on the path with its detours.
+        Returns:
+            (N, 3) metres, world frame.
+        """
         arc = self.on_it(arc, detours, by_arc)
         aside = interpolate(arc, self.arc, self.left) * self.aside(arc, detours)[:, None]
         return interpolate(arc, self.arc, self.places) + aside
 
     def on_it(self, arc: np.ndarray, detours, by_arc: bool) -> np.ndarray:
-        """Arc lengths (N,) on the path as it was, of whoever has gone `arc` (N,) metres with the detours."""
+        """Convert arc lengths on the path with detours to arc lengths on the original path.
+
+        Args:
+            arc: (N,) metres that the body has moved along the path with its detours.
+            detours: (arc, width, offset) of each detour, metres.
+            by_arc: False if `arc` is already measured on the original path.
+        Returns:
+            (N,) metres along the original path.
+        """
         if not by_arc or not detours:
             return self._within(arc, self.length)
         if detours not in self.tables:
@@ -240,18 +344,26 @@ class Way:
         return np.interp(self._within(arc, gone[-1]), gone, at)
 
     def _gone(self, detours):
-        """Places (K,) along the path as it was, and the metres (K,) gone with the detours up to there."""
+        """Build a table: (K,) metres along the original path and (K,) metres along the path with detours."""
         low = np.array([[middle - 0.5 * width] for middle, width, _ in detours])
         wide = np.array([[width] for _, width, _ in detours])
         at = (low + wide * np.linspace(0.0, 1.0, _PIECES + 1)).ravel()
         at = np.unique(np.concatenate([[0.0, self.length], self._within(at, self.length)]))
         aside = self.aside(at, detours)
+        # An offset to the inside of a bend shortens the path by offset * curvature, to the outside it lengthens it.
         along = 1.0 - 0.5 * (aside[1:] + aside[:-1]) * np.interp(0.5 * (at[1:] + at[:-1]), self.arc, self.bend)
         step = np.hypot(np.diff(at) * along, np.diff(aside))
         return at, np.concatenate([[0.0], np.cumsum(step)])
 
     def extra(self, arc: np.ndarray, aside: np.ndarray) -> np.ndarray:
-        """Metres (A, N) gone beyond those of the path at arc lengths (N,), since the first of them; aside: (A, N)."""
+        """Compute the length that an offset adds to the path, counted from the first arc length.
+
+        Args:
+            arc: (N,) metres along the original path.
+            aside: (A, N) metres to the left.
+        Returns:
+            (A, N) metres.
+        """
         step = np.diff(arc)
         bend = np.interp(0.5 * (arc[1:] + arc[:-1]), self.arc, self.bend)
         along = step * (1.0 - 0.5 * (aside[:, 1:] + aside[:, :-1]) * bend)
@@ -259,7 +371,7 @@ class Way:
         return np.concatenate([np.zeros((len(aside), 1)), np.cumsum(more, axis=1)], axis=1)
 
     def aside(self, arc: np.ndarray, detours) -> np.ndarray:
-        """Metres (N,) to the left."""
+        """Compute the lateral offset (N,) m at arc lengths (N,) m."""
         return round_offsets(arc, detours, self.length) if self.closed else offsets(arc, detours)
 
     def _within(self, arc, length):

@@ -1,10 +1,10 @@
-"""The feet of a motion that rides another path: held where they stand, on level ground or any other.
+"""Plant the feet of a motion on another path, on level ground or any other.
 
-As `foot_plant`, with three differences. The ground may rise and tip (`ground_contact`): feet keep the height above it
-that they had above their own, soles and their steps tip with it, and the pelvis follows the mean of what is under both
-feet. A leg that is asked to be straighter than it was nears its full length gently, the same in the air and on the
-ground, so that no knee pops when a foot arrives. And only the joints of the legs are looked at, since paths are
-dragged.
+As `foot_plant`, with three differences. The ground may rise and tilt (`ground_contact`): feet keep the height above it
+that they had above their own ground, soles and their steps tilt with it, and the pelvis follows the mean of the ground
+under both feet. A leg that must be straighter than it was approaches its full length smoothly, in the air as on the
+ground, so that no knee pops when a foot arrives. And only the joints of the legs are evaluated, since paths are dragged
+interactively.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from ..motion.track import zero_phase_hann
 from .ground_contact import Surface, footing
 
 MOST_SHIFT = 0.45
-"""Metres that a standing foot is moved over the ground at most, before it is held less firmly: bodies that turn on the
-spot turn otherwise on another path."""
+"""Metres that a foot in contact is moved over the ground at most, before it is held less firmly: bodies that turn on
+the spot turn differently on another path."""
 FIRST_DROP = 0.015
-"""Metres that the pelvis is lowered before a heel is raised where a leg does not reach."""
+"""Metres that the pelvis is lowered before a heel is raised, where a leg does not reach."""
 DROP_BY_SLOPE = 0.15
 """Metres more that the pelvis is lowered at most, times the slope of the ground: downhill the other foot is low."""
 SINK_BY_SLOPE = 0.15
@@ -36,26 +36,31 @@ SINK_BY_SLOPE = 0.15
 SPARE = 0.008
 """Metres below full length within which a leg that was bent more eases towards it."""
 LONGEST = (0.3, 1.3)
-"""How many times as long as it was a step is made at least and at most."""
+"""Lower and upper limit of a step's length over that recorded."""
 BENT_ALOFT, STRAIGHT_ALOFT, STIFF = 0.2, 0.01, 0.05
-"""Weights of what the goals ask of a leg in the air, bent more or straighter than it was, against 1 on the ground, and
-of a smooth course."""
+"""Weights, against 1 on the ground, of the goals of a leg in the air that is bent more, or straighter, than recorded;
+and of the smoothness of the correction."""
 LEAST_BEND = 0.05
-"""Root of the metres that a leg always lacks to its full length."""
-_FIRM = 4.0  # how sharply: at full length asked, a sixth of SPARE is left
+"""Root of the metres that a leg always stays short of its full length."""
+_FIRM = 4.0  # sharpness of the limit: where the goal is at full length, a sixth of SPARE is left
 _PELVIS_SECONDS, _STRIDE = 0.5, 0.5  # seconds; metres between the feet on stairs, in the mean
 _UP = np.array([0.0, 0.0, 1.0])
 _ROUNDS, _SLIDES_FROM = 2, 0.004  # rounds of holding stances less firmly; m of sliding that need none
-_FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recording's floor: waves of half a second pass half; metres
-_NEAR, _FIRMER = 0.004, 8  # metres off its goal beyond which a standing foot is held more firmly, times in a row
+_FLOOR, _EVEN = 200.0, 0.003  # smoothness of a recorded floor: half of a half-second wave passes; metres
+_NEAR, _FIRMER = 0.004, 8  # metres off its goal beyond which a foot in contact is held more firmly; rounds of that
 _MORE_BENT = 0.5  # share of its new bend from which on a leg's own direction counts fully
 _BEHIND = 0.1  # seconds by which a rise or drop is spread
 
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """What the feet go on. own (T, 2) m: heights of each foot's ground that the motion was laid with; up (T, 2, 3) its
-    normals; surface: what they are to go on instead, None where that is the same."""
+    """The ground under the feet.
+
+    Attributes:
+        own: (T, 2) metres, height of each foot's ground in the constructed motion.
+        up: (T, 2, 3) its unit normals, world frame.
+        surface: the ground to plant on; None if it is the same.
+    """
 
     own: np.ndarray
     up: np.ndarray
@@ -64,7 +69,12 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Steps:
-    """How long steps are: direction (T,) radians of travel and times (T,) as long as the motion was laid out with."""
+    """By how much steps are longer than in the constructed motion.
+
+    Attributes:
+        direction: (T,) radians, heading of travel.
+        scale: (T,) length of steps over those constructed.
+    """
 
     direction: np.ndarray
     times: np.ndarray
@@ -72,10 +82,20 @@ class Steps:
 
 def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing: np.ndarray, fps: float,
            ground: Ground, sole: float, steps: Steps | None = None) -> Planted:
-    """The motion with its feet held wherever `standing` (T, 2, 2) says that heels and toes stand.
+    """Plant the feet of a motion on the ground wherever they are in contact.
 
-    root (T, 3) m and rotations (T, J, 4) local: the motion laid out. sole: metres that the foremost joint of a flat
-    foot is above its ground. steps: None where they are as long as they were."""
+    Args:
+        skeleton: of the motion, with legs.
+        root: (T, 3) metres, the constructed motion's root, world frame.
+        rotations: (T, J, 4) local rotations of the constructed motion.
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe.
+        fps: frames per second.
+        ground: the motion's own ground and the ground to plant on.
+        sole: metres from the ground to the foremost joint of a flat foot.
+        steps: scale of the steps; None if they keep their length.
+    Returns:
+        Root, rotations, correction and miss of each foot.
+    """
     legs, kept, limbs = _legs(skeleton)
     places, world = pose_kinematics(legs, root, rotations[:, kept])
     scale, spread = 30.0 / fps, _frames(_BEHIND, fps)
@@ -84,6 +104,8 @@ def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing
         feet = [_stretched(foot, root, steps) for foot in feet]
     feet = [foot_plant.turned_flat(foot, scale) for foot in feet]
     feet, lifted = _on_own_ground(feet, ground.own, sole, scale)
+    # Rounds: hold the stances, place the feet on the ground, drop the pelvis; where legs still lack length, hold less
+    # firmly.
     firm = [foot.weight for foot in feet]
     for turn in range(_ROUNDS + 1):
         shifts = [foot_plant.held_shift(foot.moves, weight, scale, MOST_SHIFT)[0] for foot, weight in zip(feet, firm)]
@@ -97,6 +119,7 @@ def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing
         if turn == _ROUNDS or max(s.max(initial=0.0) for s in short) <= _SLIDES_FROM:
             break
         firm = [foot_plant.held_less(weight, s) for weight, s in zip(firm, short)]
+    # `down` is how far the whole body goes down: both drops, less the rise of the ground.
     down = (first + drop - up)[:, None] * _UP
     places = places - down[:, None]
     out, correction, miss = np.array(rotations, dtype=float), np.zeros((len(root), 2)), np.zeros((len(root), 2))
@@ -115,8 +138,7 @@ def follow(skeleton: Skeleton, root: np.ndarray, rotations: np.ndarray, standing
 
 @lru_cache(maxsize=32)
 def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
-    """A skeleton's legs and what they hang on, their joints in the whole one, and the limbs by the joints of the
-    part."""
+    """Extract the legs of a skeleton: the partial skeleton, its joints in the whole one, and its limbs."""
     body = identify(skeleton)
     named = [[limb.upper_leg, limb.lower_leg, limb.foot, limb.toe_or_foot] for limb in (body.left, body.right)]
     legs, kept = skeleton.part([joint for side in named for joint in side])
@@ -128,8 +150,7 @@ def _legs(skeleton: Skeleton) -> tuple[Skeleton, list[int], tuple[Limb, ...]]:
 
 
 def _steady(foot: Foot) -> Foot:
-    """The foot with its left as it is in the mean of the frames where it lies level: seen from above a foot that stands
-    on its toes points nowhere."""
+    """Replace a foot's left axis by its mean over level frames: from above, a foot on its toes has no direction."""
     level = np.linalg.norm((foot.toe - foot.heel)[:, :2], axis=1, keepdims=True)
     own = np.sum(quaternion.rotate(quaternion.inverse(foot.rotation), foot.left) * level**2, axis=0)
     left = quaternion.rotate(foot.rotation, unit_vector(own)) * [1.0, 1.0, 0.0]
@@ -138,7 +159,7 @@ def _steady(foot: Foot) -> Foot:
 
 
 def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
-    """The foot further before or behind the body, as far as LONGEST allows."""
+    """Move the foot further before or behind the body, within the limits of LONGEST."""
     along = np.stack([np.cos(steps.direction), np.sin(steps.direction)], axis=1)
     ahead = np.sum((0.5 * (foot.heel + foot.toe) - root)[:, :2] * along, axis=1)
     much = np.clip(steps.times, *LONGEST) - 1.0
@@ -146,8 +167,11 @@ def _stretched(foot: Foot, root: np.ndarray, steps: Steps) -> Foot:
 
 
 def _on_own_ground(feet: list[Foot], own: np.ndarray, sole: float, scale: float) -> tuple[list[Foot], np.ndarray]:
-    """Feet on their ground, `own` (T, 2) m high, since the floors of recordings are uneven and drift; metres (T,) by
-    which the body is off it: by as much as the feet that stand, and as they were in the air."""
+    """Place the feet on their own ground, since recorded floors are uneven and drift.
+
+    own: (T, 2) metres. Returns the feet and the metres (T,) by which the body is off its ground: known where feet are
+    in contact, interpolated smoothly in the air.
+    """
     above = [foot.moved(-height[:, None] * _UP) for foot, height in zip(feet, own.T)]
     lifts = [foot_plant.lift_to_ground(foot, sole, scale) for foot in above]
     weights = [foot.carries for foot in feet]
@@ -164,8 +188,11 @@ def _frames(seconds: float, fps: float) -> int:
 
 def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Ground,
                lifted: np.ndarray) -> tuple[list[Foot], np.ndarray, float]:
-    """Feet on their ground, metres (T,) by which the body goes up for that, and metres by which it may go down further;
-    lifted (T,) m: by which the feet were lifted before."""
+    """Place the feet on the target ground.
+
+    lifted: (T,) metres by which the feet were lifted before. Returns the feet, metres (T,) by which the body rises with
+    the ground, and metres by which the pelvis may drop.
+    """
     if ground.surface is None:
         up = lifted
         return [replace(foot, hip=foot.hip + up[:, None] * _UP) for foot in feet], up, foot_plant.MOST_DROP
@@ -182,19 +209,19 @@ def _on_ground(feet: list[Foot], standing: np.ndarray, fps: float, ground: Groun
 
 
 def _steepness(height: np.ndarray, normal: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) how steep the ground is that two feet are on, from its heights (T, 2) m and normals (T, 2, 3)."""
+    """Measure how steep the ground under both feet is (T,), from its heights (T, 2) m and normals (T, 2, 3)."""
     slope = np.linalg.norm(normal[..., :2], axis=2) / np.maximum(normal[..., 2], 0.1)
     apart = np.abs(np.diff(height, axis=1)) / _STRIDE
     return np.maximum(slope.mean(axis=1), zero_phase_hann(apart, fps, 1.0)[:, 0])
 
 
 def _followed(height: np.ndarray, fps: float) -> np.ndarray:
-    """The pelvis's share (T,) m of what is under the feet."""
+    """Smooth the height (T,) m under the feet to that which the pelvis follows."""
     return zero_phase_hann(height[:, None], fps, _PELVIS_SECONDS)[:, 0]
 
 
 def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Foot:
-    """The foot tipped (T, 4) about its toe and brought up by rise (T,) m; its hip goes up by `up` (T,) m."""
+    """Rotate the foot by `tip` (T, 4) about its toe and raise it by `rise` (T,) m; its hip rises by `up` (T,) m."""
     toe = foot.toe + rise[:, None] * _UP
     return replace(foot, hip=foot.hip + up[:, None] * _UP, toe=toe,
                    heel=toe + quaternion.rotate(tip, foot.heel - foot.toe),
@@ -202,28 +229,34 @@ def _tipped(foot: Foot, tip: np.ndarray, rise: np.ndarray, up: np.ndarray) -> Fo
 
 
 def _goal(foot: Foot, spread: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ankle goes (T, 3) and the foot's world rotation (T, 4): on its toe where the leg does not reach."""
+    """Compute the ankle's goal (T, 3) and the foot's world rotation (T, 4): on its toe where the leg does not reach."""
     rise = foot_plant.spread_over(foot_plant.heel_rise(foot, np.zeros((1, 3))) * foot.weight[:, 1], spread)
     roll = quaternion.about_axis(foot.left, rise)
     return foot.toe + quaternion.rotate(roll, foot.heel - foot.toe), quaternion.multiply(roll, foot.rotation)
 
 
 def _clear_bend(foot: Foot, far: np.ndarray) -> np.ndarray:
-    """(T,) share of a leg's length by which its knee was to be off the line hip-ankle for its direction to be believed;
-    far (T,) m: how long the leg is to be. Of a leg that bends much more than it did the direction's tremble grows."""
+    """Compute the least offset of a knee from the line hip-ankle, as a share of the leg (T,), for its direction to
+    count.
+
+    far: (T,) metres, new length of the leg. In a leg that bends much more than recorded, the noise of the direction
+        grows.
+    """
     return np.maximum(CLEAR_BEND, 0.5 * _MORE_BENT * np.sqrt(np.maximum(1.0 - (far / foot.length) ** 2, 0.0)))
 
 
 def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.ndarray:
-    """Goals (T, 3) as a leg can follow them, brought nearer to the hip or further away.
+    """Limit the goals (T, 3) to what a leg can follow, nearer to the hip or further away.
 
-    A knee bends with the root of what its leg lacks to its full length. In these roots what a leg is to differ from the
-    recording is one smooth curve: what the goals ask for where the foot stands, and little of it in the air where that
-    would make the leg straighter than it was."""
+    A knee bends with the root of what its leg lacks to full length. In these roots the correction of a leg is one
+    smooth curve: that of the goals where the foot is in contact, and little of it in the air where it would straighten
+    the leg.
+    """
     line = goal - hip
     far = np.linalg.norm(line, axis=1)
     own = np.maximum(foot.own, 1e-5)
     room = SPARE * (1.0 - np.exp(-own / SPARE))
+    # `left`: metres to full length after a soft limit at zero; `more`: the change of its root against the recording.
     left = room / _FIRM * np.logaddexp(0.0, _FIRM * (foot.length - far) / room)
     more = np.sqrt(left) - np.sqrt(own)
     stands = foot.carries > 0.0
@@ -231,6 +264,7 @@ def _eased(foot: Foot, goal: np.ndarray, hip: np.ndarray, scale: float) -> np.nd
     for _ in range(_FIRMER + 1):
         bend = np.sqrt(own) + settled(weight * more, weight, scale, STIFF)
         bend = 0.5 * (bend + np.sqrt(bend**2 + LEAST_BEND**2))
+        # Feet in contact that miss their goal get more weight, until all are within _GOAL_TOLERANCE.
         off = np.where(stands, np.abs(foot.length - bend**2 - far), 0.0) / _NEAR
         if off.max(initial=0.0) <= 1.0:
             break

@@ -1,10 +1,11 @@
-"""The ground under a rider's feet: where each foot stands, how high and how steep it is there, and in between;
-and where a path bends more tightly, or climbs more steeply, than feet can follow: none is planted there, and a line
-says so.
+"""The ground under the feet on a new path: its height and slope at each stance, and between stances.
 
-A foot's ground is a plane for as long as it stands, through what lies under its heel and its toe. On its way from one
-stance to the next it goes over from plane to plane, and is lifted where something sticks out in between (a stair's
-edge). So the ground's own roughness never shakes a foot, and stairs have no corners.
+Also the stretches where a path bends more tightly, or climbs more steeply, than feet can follow: there no foot is
+planted, and a message names them.
+
+The ground of a foot is one plane for each stance, through the ground under its heel and its toe. During a swing it is
+blended from plane to plane, and raised where something protrudes in between (a stair's edge). So the roughness of the
+ground never shakes a foot, and stairs have no corners.
 """
 
 from __future__ import annotations
@@ -24,35 +25,40 @@ from ..motion.path.path import Path
 from ..motion.path.terrain import Terrain
 
 STEEPEST = 0.7
-"""Slope of the ground under a foot beyond which it is an edge that the foot stands on, flat."""
+"""Slope of the ground under a foot beyond which it is an edge, on which the foot stays flat."""
 CLEARANCE, MOST_LIFT = 0.02, 0.35
-"""Metres that a foot in the air keeps above the ground, or as much as it had, and that it is lifted for that at
-most."""
+"""Metres that a foot in the air keeps above the ground, or as many as it had; and the metres that it is raised for that
+at most."""
 ABOVE = 1.0
-"""Metres above the path below which the ground is looked for: a bridge overhead is not stood on."""
-_EVERY = 0.03  # metres between the places at which a path's height is looked up
-_BEYOND = 1.5  # metres by which its ends are continued
-_ROUNDS = 4
-_EDGE, _SHORT_STEP = 0.2, 0.3  # share of a swing, and metres
-_LONGEST_SWING = 1.5  # seconds; a foot that is longer in the air follows the ground below it
+"""Metres above the path below which the ground is searched: a bridge overhead is no ground."""
+_EVERY = 0.03  # metres between the samples of a path's height
+_BEYOND = 1.5  # metres by which its ends are extrapolated
+_ROUNDS = 4  # Newton steps to find the nearest place of the path
+_EDGE, _SHORT_STEP = 0.2, 0.3  # share of a swing at either end, and metres of a step, blended by time
+_LONGEST_SWING = 1.5  # seconds; a foot that is in the air for longer follows the ground below it
 
 Surface = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """(places (N, 2) m, frames (N,) int in which a foot is there) -> heights (N,) m and slopes (N, 2), by x and by y."""
 TIGHT = 0.3
 """Metres of radius, about a foot's length, below which a bend is too tight to walk on."""
 STEEP = 60.0
-"""Degrees from which on a path is no ground."""
+"""Degrees from which on a path is too steep to be ground."""
 LASTING = 0.5
-"""Metres of path, within a metre, that have to be so: a single corner is only a corner."""
-_JOINED = 0.5  # seconds between two such stretches that are one
-_FADE = 0.12  # seconds, twice of which go by from feet that are planted to feet that are not
-_AS_OWN = 1.5  # times the own path's curvature up to which a bend is the motion's own
+"""Metres of path, within one metre, that must be tight or steep: a single corner is only a corner."""
+_JOINED = 0.5  # seconds; a shorter gap joins two such stretches
+_FADE = 0.12  # seconds; twice that is the blend from planted to free feet
+_AS_OWN = 1.5  # factor on the curvature or slope of the motion's own path up to which the motion can follow
 
 
 @dataclass(frozen=True, eq=False)
 class Footing:
-    """The ground that two feet are told by. height (T, 2) m at each toe, slope (T, 2, 2) by x and by y, and lift (T, 2)
-    m by which a foot in the air has to go higher."""
+    """The ground of two feet in T frames.
+
+    Attributes:
+        height: (T, 2) metres at each toe.
+        slope: (T, 2, 2) rise by x and by y, world frame.
+        lift: (T, 2) metres by which a foot in the air is raised.
+    """
 
     height: np.ndarray
     slope: np.ndarray
@@ -60,19 +66,27 @@ class Footing:
 
     @property
     def normal(self) -> np.ndarray:
-        """(T, 2, 3) unit vectors square to the ground."""
+        """(T, 2, 3) unit normals of the ground."""
         up = np.concatenate([-self.slope, np.ones((*self.slope.shape[:2], 1))], axis=2)
         return up / np.linalg.norm(up, axis=2, keepdims=True)
 
 
 def is_level(path: Path, arc: ArcLength) -> bool:
-    """Whether a path has one height all along."""
+    """Return whether a path has the same height everywhere."""
     heights = path.at(arc.parameter(np.linspace(0.0, arc.length, 200)))[:, 2]
     return bool(np.ptp(heights) < 1e-4)
 
 
 def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
-    """The path's own height, level across it. passed (T,) m: where on the path the body is in every frame."""
+    """Build a surface with the path's own height, level across it.
+
+    Args:
+        path: the path.
+        arc: its arc length.
+        passed: (T,) metres along the path where the body is in each frame.
+    Returns:
+        The surface.
+    """
     count = int(np.clip(arc.length / _EVERY, 8, 20000)) + 1
     at = np.linspace(0.0, arc.length, count)
     u = arc.parameter(at)
@@ -87,6 +101,8 @@ def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
         return interpolate(inside, at, table)
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Find the nearest place of the path for each place, and its height and slope."""
+        # Start where the body is, then step along the tangent: a path that crosses itself keeps its own level.
         s = passed[frames].copy()
         for _ in range(_ROUNDS):
             here = look(s)
@@ -102,9 +118,17 @@ def path_surface(path: Path, arc: ArcLength, passed: np.ndarray) -> Surface:
 
 
 def mesh_surface(terrain: Terrain, origin: np.ndarray) -> Surface:
-    """A mesh, and where it ends the height of the path; origin (T, 3) m: where on the path the body is."""
+    """Build a surface from a mesh, with the height of the path beyond the mesh.
+
+    Args:
+        terrain: the mesh.
+        origin: (T, 3) metres on the path where the body is in each frame.
+    Returns:
+        The surface.
+    """
 
     def surface(places: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Look up height and slope of the mesh below the path's level."""
         below = origin[frames, 2] + ABOVE
         height, normal = terrain.heights(places, below)
         none = ~np.isfinite(height)
@@ -119,20 +143,30 @@ def mesh_surface(terrain: Terrain, origin: np.ndarray) -> Surface:
 
 
 def footing(feet: np.ndarray, standing: np.ndarray, clear: np.ndarray, fps: float, surface: Surface) -> Footing:
-    """The ground under two feet.
+    """Compute the ground under two feet.
 
-    feet (T, 2, 2, 2) m: left and right, heel and toe, over the ground; standing (T, 2, 2) bool; clear (T, 2) m: how
-    high each foot was above its own ground."""
+    Args:
+        feet: (T, 2, 2, 2) metres, left and right, heel and toe, x and y.
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe.
+        clear: (T, 2) metres of each foot above its own ground.
+        fps: frames per second.
+        surface: the ground.
+    Returns:
+        Height, slope and lift of each foot.
+    """
     sides = [_side(feet[:, side], standing[:, side].any(axis=1), clear[:, side], fps, surface) for side in (0, 1)]
     return Footing(*(np.stack(parts, axis=1) for parts in zip(*sides)))
 
 
 def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, surface: Surface):
-    """Heights (T,), slopes (T, 2) and lifts (T,) of one foot; feet (T, 2, 2), heel and toe."""
+    """Compute heights (T,), slopes (T, 2) and lifts (T,) of one foot; feet (T, 2, 2), heel and toe."""
     spans = _stances(stands, fps)
     firsts, ends = np.array(spans).T
     middle = (firsts + ends - 1) // 2
     sums = np.concatenate([np.zeros((1, 2, 2)), np.cumsum(feet, axis=0)])
+    # `before` and `after` index the stances around each frame; `time_share` is the time of the swing between them, from
+    # 0 to
+    # 1.
     mean = (sums[ends] - sums[firsts]) / (ends - firsts)[:, None, None]
     height, slope = _planes(mean[:, 0], mean[:, 1], middle, surface)
     before = np.clip(np.searchsorted(firsts, np.arange(len(feet)), side="right") - 1, 0, len(spans) - 1)
@@ -148,8 +182,10 @@ def _side(feet: np.ndarray, stands: np.ndarray, clear: np.ndarray, fps: float, s
 
 
 def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """How much of its way from stance to stance (T, 2) a foot has gone, from 0 to 1: over the ground, but by time,
-    `way` (T,), where it leaves and arrives and where it stays about where it is."""
+    """Compute the progress of a foot from stance to stance, from 0 to 1.
+
+    By distance over the ground, but by time, `time_share` (T,), at take-off and landing and where a step is short.
+    """
     by_time = quintic_step_by_powers(way)
     step = there - here
     length = np.sum(step * step, axis=1)
@@ -159,7 +195,7 @@ def _gone(toe: np.ndarray, here: np.ndarray, there: np.ndarray, way: np.ndarray)
 
 
 def _stances(stands: np.ndarray, fps: float) -> list[tuple[int, int]]:
-    """(first, end) of every stance (T,), and moments in between where a foot is long in the air."""
+    """Find (first, end) of every stance (T,), and moments in between where a foot is long in the air."""
     count, longest = len(stands), max(int(_LONGEST_SWING * fps), 1)
     spans = runs(stands)
     edges = [(-1, 0), *spans, (count, count)]
@@ -172,7 +208,7 @@ def _stances(stands: np.ndarray, fps: float) -> list[tuple[int, int]]:
 
 
 def _planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
-    """Height (S,) at the toe and slope (S, 2) of the ground under feet with heels and toes (S, 2)."""
+    """Fit the ground under feet with heels and toes (S, 2): height (S,) at the toe and slope (S, 2)."""
     high, slope = surface(np.concatenate([toe, heel]), np.tile(frames, 2))
     (at_toe, at_heel), slope = np.split(high, 2), 0.5 * np.add(*np.split(slope, 2))
     along = toe - heel
@@ -189,7 +225,9 @@ def _planes(heel: np.ndarray, toe: np.ndarray, frames: np.ndarray, surface: Surf
 
 def _clearing(feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np.ndarray, way: np.ndarray,
               which: np.ndarray, surface: Surface) -> np.ndarray:
-    """(T,) metres by which a foot in the air goes higher so that neither end of it is in the ground: a bump a swing."""
+    """Compute the lift (T,) m of a foot in the air that keeps heel and toe out of the ground: one bump for each
+    swing.
+    """
     lift = np.zeros(len(feet))
     aloft = np.flatnonzero((way > 0.0) & (way < 1.0))
     if not len(aloft):
@@ -201,53 +239,86 @@ def _clearing(feet: np.ndarray, height: np.ndarray, slope: np.ndarray, clear: np
     bump = 16.0 * (way * (1.0 - way)) ** 2
     asked = np.maximum(lacks, 0.0) / np.maximum(bump[aloft], 0.15)
     most = np.zeros(which.max() + 1)
+    # The highest lift that any frame of a swing needs, `which` (T,) being the number of the swing.
     np.maximum.at(most, which[aloft], asked)
     lift[aloft] = (np.minimum(most, MOST_LIFT)[which] * bump)[aloft]
     return lift
 
 
 def find_tight(path: Path, at: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) bool: frames within a tight stretch. at (T,): the path's parameters, arc (T,) m passed until then, own (T,)
-    1/m: how much the motion's own path bends there: what it could do it still can."""
+    """Find the frames within a tight bend.
+
+    Args:
+        path: the path.
+        at: (T,) its parameters.
+        arc: (T,) metres along it.
+        own: (T,) 1/m, curvature of the motion's own path: what the motion could follow, it still can.
+        fps: frames per second.
+    Returns:
+        (T,) bool.
+    """
     bend = curvature(path, at)
     return _lasting((bend > 1.0 / TIGHT) & (bend > _AS_OWN * own), arc, fps)
 
 
 def find_steep(tangent: np.ndarray, arc: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) bool: frames within a steep stretch; tangent (T, 3) of any length, own (T,) radians the slope of the
-    motion's own path."""
+    """Find the frames within a steep stretch.
+
+    Args:
+        tangent: (T, 3) tangents of any length.
+        arc: (T,) metres along the path.
+        own: (T,) radians, slope of the motion's own path.
+        fps: frames per second.
+    Returns:
+        (T,) bool.
+    """
     slope = arctan2(np.abs(tangent[:, 2]), np.linalg.norm(tangent[:, :2], axis=1))
     return _lasting((slope > np.radians(STEEP)) & (slope > _AS_OWN * np.abs(own)), arc, fps)
 
 
 def curvature(path: Path, at: np.ndarray) -> np.ndarray:
-    """(T,) 1/m: how much a path bends over the ground at parameters `at` (T,)."""
+    """Compute the curvature (T,) 1/m of a path over the ground at parameters `at` (T,)."""
     first, second = path.at(at, 1)[:, :2], path.at(at, 2)[:, :2]
     return np.abs(cross_level(first, second)) / np.maximum(np.linalg.norm(first, axis=1), 1e-6) ** 3
 
 
 def share_free(free: np.ndarray, fps: float) -> np.ndarray:
-    """(T,) from 0 to 1: how far within the stretches `free` (T,) bool a frame is, smoothly from their borders on."""
+    """Compute the share of the constructed motion against the planted one around free stretches.
+
+    Args:
+        free: (T,) bool, frames in which no foot is planted.
+        fps: frames per second.
+    Returns:
+        (T,) from 0 to 1, smooth from the borders of each stretch on.
+    """
     wide = int(round(_FADE * fps))
     inner = minimum_filter1d(free.astype(float), 2 * wide + 1, mode="nearest")
     return hann_smooth(inner, wide)
 
 
 def strain_lines(tight: np.ndarray, steep: np.ndarray, fps: float) -> tuple[TimedLine, ...]:
-    """One line for each kind of stretch, with its seconds; tight and steep (T,) bool."""
+    """Report the stretches where feet are not planted.
+
+    Args:
+        tight: (T,) bool, frames within a tight bend.
+        steep: (T,) bool, frames within a steep stretch.
+        fps: frames per second.
+    Returns:
+        One message for each kind of stretch, with its seconds.
+    """
     lines = []
     for which, what in ((tight, f"the path bends more tightly than {TIGHT:g} m radius"),
                         (steep, f"the path is steeper than {STEEP:g} degrees")):
         spans = [(first / fps, (end - 1) / fps) for first, end in runs(which)]
         if spans:
-            more = f" and {len(spans) - 1} times more" if len(spans) > 1 else ""
+            more = f" and {len(spans) - 1} more times" if len(spans) > 1 else ""
             when = f"from {spans[0][0]:.1f} s to {spans[0][1]:.1f} s{more}"
             lines.append(TimedLine(f"{what} {when}: feet are not planted there; smooth the path", *spans))
     return tuple(lines)
 
 
 def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
-    """`bad` (T,) where it goes on for LASTING metres within the metre around it."""
+    """Select the frames of `bad` (T,) where it holds for LASTING_METRES metres within the metre around."""
     if not bad.any():
         return bad
     step = np.abs(np.diff(arc, prepend=arc[:1]))
@@ -258,7 +329,7 @@ def _lasting(bad: np.ndarray, arc: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _joined(which: np.ndarray, fps: float) -> np.ndarray:
-    """`which` (T,) with gaps of at most _JOINED seconds between two true ones filled."""
+    """Fill the gaps of at most _JOIN_SECONDS seconds between true frames of `which` (T,)."""
     out, gap = which.copy(), int(_JOINED * fps)
     spans = runs(which)
     for (_, end), (first, _) in zip(spans[:-1], spans[1:]):

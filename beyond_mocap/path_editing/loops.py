@@ -1,9 +1,9 @@
-"""Where a motion can be repeated: pairs of frames at which the body does the same thing, a stride or more apart.
+"""Find where a motion can be repeated: pairs of frames with the same pose and movement, a stride or more apart.
 
-Compared are places and velocities of the main joints as seen from the path's moving frame, travelling with the body, in
-a window around both frames; which soles stand; and how far the body lies off its path. A motion graph (Kovar et al.
-2002) finds its transitions alike. The search is bounded: rough over at most two and a half million pairs, then exact
-around the best two dozen.
+The comparison uses places and velocities of the main joints in the path's moving frame, which travels with the body, in
+a window around both frames; the soles in contact; and the offset of the body from its path. A motion graph (Kovar et
+al. 2002) finds its transitions in the same way. The search is bounded: coarse over at most two and a half million
+pairs, then exact around the best two dozen.
 """
 
 from __future__ import annotations
@@ -20,29 +20,35 @@ from ..motion.skeleton import Skeleton
 from .path_frame import Residuals
 
 WINDOW_SECONDS = 0.12
-"""Pairs are compared over so much before and after."""
+"""Pairs are compared over this time before and after."""
 _VELOCITY_SECONDS = 0.1  # metres per second count as metres moved in this time
-_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24
-_STRIDE_SHARE = 0.85  # a loop is at least so long, of the stride's time: strides differ
-_SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which nobody loops: a stop is no gait
-_LABEL = 0.06  # metres that a wrong sole costs
-_FEET = 0.5  # what a metre costs by which feet that stand at both ends stand elsewhere: they would be moved there
-_CROWDED = 0.05  # metres that it costs to have no frames to fade over
-_VARIETY = 0.3  # how much better one more stride makes a loop of one stride
-_MOST = 0.6  # how unlike a loop's ends are at most
-_EACH_FOOT = 0.08  # of a loop's time that each foot stands alone at least: who jumps with both feet has no stride
-_JOINTS = 16  # compared at most, of a body that is not a human one
+_ROUGH_FPS, _PAIRS, _COLUMNS, _TRIED = 30.0, 2_500_000, 9000, 24  # coarse rate; limits of pairs, rows, candidates
+_STRIDE_SHARE = 0.85  # shortest loop, as a share of the stride's time: strides differ
+_SLOWEST, _SLOW_SHARE = 0.2, 0.5  # m/s, and share of the usual speed, below which no loop starts: a stop is no gait
+_LABEL = 0.06  # cost in metres of a sole whose contact differs
+_FEET = 0.5  # cost of each metre between the places of feet in contact at both ends: the fade would move them
+_CROWDED = 0.05  # cost in metres of having no frames to fade over
+_VARIETY = 0.3  # by how much a second stride improves a loop of one stride
+_MOST = 0.6  # largest relative distance of a loop's ends
+_EACH_FOOT = 0.08  # least share of a loop with each foot alone in contact: jumps with both feet are no strides
+_JOINTS = 16  # compared at most, for a body without known joints
 _SHORTEST_STRIDE, _LONGEST_STRIDE = 0.35, 2.5  # seconds
 
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """Frames `start` .. `end` - 1 shown again and again: at `end` the body does what it does at `start`.
+    """Frames `start` .. `end` - 1 to be repeated: at `end` the pose and movement are those at `start`.
 
-    apart: metres by which both differ (root mean square over joints, places and velocities, in a window around them);
-    unlike: the same as a share of how far apart any two moments of the motion are; cost: the same in metres with what
-    else speaks against the loop; metres: arc length of once round; strides: how many strides that is, about; ending:
-    how unlike anything in the loop the motion's last moment is, on the scale of `unlike`."""
+    Attributes:
+        start: first frame.
+        end: first frame after the loop.
+        distance: metres between both ends (root mean square over joints, places and velocities, in a window).
+        relative_distance: the same as a share of the usual distance of two moments of the motion.
+        cost: metres, the distance with all that counts against the loop.
+        metres: arc length of one lap.
+        strides: of one lap, about.
+        end_distance: distance of the motion's last moment from the nearest in the loop, as `relative_distance`.
+    """
 
     start: int
     end: int
@@ -58,8 +64,13 @@ class Loop:
 
 
 def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
-    """The best loop of each number of strides, the best of all first; () for a motion that does not move on, or moves
-    on for less than a stride."""
+    """Find the best loop for each number of strides.
+
+    Args:
+        residuals: the motion relative to its own path.
+    Returns:
+        Loops, lowest cost first; () for a motion that stays in place, or moves for less than a stride.
+    """
     pace = smooth_speed(residuals)
     moving = pace > _SLOWEST
     if not moving.any():
@@ -83,7 +94,13 @@ def find_loops(residuals: Residuals) -> tuple[Loop, ...]:
 
 
 def smooth_speed(residuals: Residuals) -> np.ndarray:
-    """(T,) metres per second along the path, the mean of half a second."""
+    """Compute the speed along the path, averaged over half a second.
+
+    Args:
+        residuals: the motion.
+    Returns:
+        (T,) metres per second.
+    """
     speed = residuals.step * residuals.fps
     if len(speed) > 1:
         speed = np.concatenate([speed[1:2], speed[1:]])
@@ -91,11 +108,16 @@ def smooth_speed(residuals: Residuals) -> np.ndarray:
 
 
 def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> float | None:
-    """Frames of a stride, from one landing of a foot to its next: the median over the motion while it moves on; None
-    without any.
+    """Measure the duration of a stride, from one landing of a foot to its next: the median while the motion moves.
 
-    Told by the soles, which land and leave; of a motion whose soles say nothing, by the lag after which its poses come
-    again; of a single stride by its two steps."""
+    From the contacts; without contacts from the lag after which poses repeat; for a single stride from its two steps.
+
+    Args:
+        residuals: the motion.
+        features: (T, D) metres as of `find_loops`; None to compute them.
+    Returns:
+        Frames, fractional; None without any stride.
+    """
     moving = smooth_speed(residuals) > _SLOWEST
     edges = np.diff(residuals.standing.any(axis=2).astype(np.int8), axis=0)
     at = [[np.flatnonzero((edges[:, side] == kind) & moving[1:]) for side in (0, 1)] for kind in (1, -1)]
@@ -109,13 +131,15 @@ def stride_frames(residuals: Residuals, features: np.ndarray | None = None) -> f
 
 
 def _usual(frames: np.ndarray, fps: float) -> float | None:
-    """The median of those that may be a stride's."""
+    """Compute the median of those durations that can be a stride's; None without any."""
     kept = frames[(frames > _SHORTEST_STRIDE * fps) & (frames < _LONGEST_STRIDE * fps)]
     return float(np.median(kept)) if len(kept) else None
 
 
 def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | None:
-    """The first lag, in frames, after which poses come again at half their usual distance or less; None without one."""
+    """Find the first lag, in frames, after which poses repeat at half their usual distance or less; None without
+    one.
+    """
     shown = features[moving]
     lags = np.arange(int(_SHORTEST_STRIDE * fps), min(int(_LONGEST_STRIDE * fps), len(shown) - 1) + 1)
     if len(lags) < 3:
@@ -127,8 +151,11 @@ def _period(features: np.ndarray, moving: np.ndarray, fps: float) -> float | Non
 
 
 def _features(residuals: Residuals) -> np.ndarray:
-    """(T, D) metres: main joints' places across and above the path, along it from the pelvis, and what they move over
-    the ground in _VELOCITY_SECONDS; scaled so that a distance is the root mean square over joints."""
+    """Compute the features (T, D) metres that loops compare.
+
+    Places of the main joints across and above the path, along it from the pelvis, and their movement over the ground in
+    _VELOCITY_SECONDS; scaled so that a distance is the root mean square over joints.
+    """
     joints = _main_joints(residuals.skeleton)
     root = residuals.place * [0.0, 1.0, 1.0]
     places = pose_kinematics(residuals.skeleton, root, residuals.rotations)[0][:, joints]
@@ -140,8 +167,9 @@ def _features(residuals: Residuals) -> np.ndarray:
 
 
 def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
-    """(T, 2, 2) metres along and across the path from the pelvis to the left and right foot; None of an unknown
-    body."""
+    """Locate the left and right foot relative to the pelvis: (T, 2, 2) metres along and across the path; None
+    without feet.
+    """
     try:
         body = identify(skeleton)
     except InputError:
@@ -152,14 +180,16 @@ def _feet(skeleton: Skeleton, features: np.ndarray) -> np.ndarray | None:
 
 
 def _slope(values: np.ndarray, reach: int) -> np.ndarray:
-    """Change per frame (T, ...) of values (T, ...), by differences over `reach` frames to either side."""
+    """Compute the change per frame (T, ...) of values (T, ...), by differences over `reach` frames to either side."""
     at = np.arange(len(values))
     after, before = np.minimum(at + reach, len(values) - 1), np.maximum(at - reach, 0)
     return (values[after] - values[before]) / np.maximum(after - before, 1).reshape(-1, *[1] * (values.ndim - 1))
 
 
 def _main_joints(skeleton: Skeleton) -> list[int]:
-    """Those that tell a pose: hips, chest, head, knees, feet, hands; of an unknown body, some spread over it."""
+    """Choose the joints that define a pose: hips, chest, head, knees, feet, hands; of an unknown body, a spread over
+    it.
+    """
     try:
         body = identify(skeleton)
     except InputError:
@@ -170,7 +200,7 @@ def _main_joints(skeleton: Skeleton) -> list[int]:
 
 
 def _strides(standing: np.ndarray, loop: Loop) -> bool:
-    """Whether one foot after the other carries the body in a loop, or nothing is known of the feet."""
+    """Return whether the feet carry the body alternately in a loop, or no contacts are known."""
     left, right = np.moveaxis(standing[loop.start : loop.end].any(axis=2), 1, 0)
     alone = min(np.mean(left & ~right), np.mean(right & ~left))
     return bool(alone >= _EACH_FOOT or not standing.any())
@@ -178,7 +208,7 @@ def _strides(standing: np.ndarray, loop: Loop) -> bool:
 
 def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: int,
            stride: float) -> list[tuple[int, int]]:
-    """Up to _TRIED pairs (start, end) of frames, all well apart from one another, that look alike at a low rate."""
+    """Search pairs (start, end) of similar frames at a low rate: up to _MOST_CANDIDATES, all well separated."""
     count, fps = len(features), residuals.fps
     every = max(int(round(fps / _ROUGH_FPS)), -(-count // _COLUMNS), 1)
     ends = np.arange(0, count, every)
@@ -187,6 +217,7 @@ def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: 
     if not len(starts) or not len(ends):
         return []
     a, b = (features[at].astype(np.float32) for at in (starts, ends))
+    # Squared distances of all starts (rows) and ends (columns) as |a|^2 + |b|^2 - 2 a b, by one matrix product.
     square = (a * a).sum(1)[:, None] + (b * b).sum(1)[None] - 2.0 * (a @ b.T)
     score = np.sqrt(np.maximum(square, 0.0))
     length = (ends[None] - starts[:, None]).astype(np.float32)
@@ -200,12 +231,14 @@ def _rough(features: np.ndarray, residuals: Residuals, free: np.ndarray, least: 
 
 
 def _liking(length: np.ndarray, still: np.ndarray, stride: float) -> np.ndarray:
-    """What distances of loops are multiplied by: long ones are liked better, those that stand still in between less."""
+    """Compute the factor on distances: lower for long loops, higher for loops that pause in between."""
     return (1.0 + _VARIETY * stride / np.maximum(length, 1.0)) * (1.0 + 2.0 * still / np.maximum(length, 1.0))
 
 
 def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
-    """The first _TRIED pairs (K, 2), best first, of which no two are within `reach` frames in both start and end."""
+    """Select the first _MOST_CANDIDATES pairs (K, 2), best first, of which no two are within `reach` frames in both
+    start and end.
+    """
     kept: list[tuple[int, int]] = []
     while len(pairs) and len(kept) < _TRIED:
         kept.append((int(pairs[0, 0]), int(pairs[0, 1])))
@@ -215,12 +248,16 @@ def _apart(pairs: np.ndarray, reach: float) -> list[tuple[int, int]]:
 
 def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], free: np.ndarray, least: int,
            stride: float, usual: float, feet: np.ndarray | None) -> Loop | None:
-    """The best loop around a rough pair, compared over windows at the full rate; usual: metres that any two moments are
-    apart; feet (T, 2, 2) m: see `_feet`."""
+    """Refine a coarse pair to the best loop around it, compared over windows at the full rate.
+
+    usual: metres between any two moments; feet (T, 2, 2) m: as of `_locate_feet`.
+    """
     count, fps = len(features), residuals.fps
     reach, window = int(np.ceil(fps / 12.0)), int(round(WINDOW_SECONDS * fps))
     start, end = (at + np.arange(-reach - window, reach + window + 1) for at in pair)
     inside = [(at >= 0) & (at < count) for at in (start, end)]
+    # All (start, end) within `reach` of the pair, with `window` more on either side; frames beyond the motion are
+    # unknown.
     known = inside[0][:, None] & inside[1][None]
     start, end = (np.clip(at, 0, count - 1) for at in (start, end))
     a, b = features[start], features[end]
@@ -229,6 +266,7 @@ def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], fr
     total, wrong, moved, seen = (
         _along_diagonals(np.where(known, v, 0.0), window) for v in (square, wrong, moved, 1.0 * known)
     )
+    # A sum along a diagonal compares the windows around start + k and end + k; `seen` counts the known ones.
     seen = np.maximum(seen, 1e-9)
     middle = slice(window, len(a) - window)
     start, end = start[middle][:, None], end[middle][None]
@@ -252,8 +290,11 @@ def _exact(features: np.ndarray, residuals: Residuals, pair: tuple[int, int], fr
 
 def _soles_apart(residuals: Residuals, feet: np.ndarray | None, start: np.ndarray,
                  end: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Of frames `start` (N,) and `end` (M,): (N, M) share of the soles that stand at one alone, and metres by which
-    feet that stand at both stand elsewhere under the body; feet (T, 2, 2)."""
+    """Compare contacts of frames `start` (N,) and `end` (M,).
+
+    Returns (N, M) the share of soles in contact at one alone, and the metres by which feet in contact at both differ
+    under the body.
+    """
     soles = residuals.standing.reshape(len(residuals), 4)
     wrong = (soles[start][:, None] != soles[end][None]).mean(axis=2)
     if feet is None:
@@ -264,6 +305,6 @@ def _soles_apart(residuals: Residuals, feet: np.ndarray | None, start: np.ndarra
 
 
 def _along_diagonals(values: np.ndarray, window: int) -> np.ndarray:
-    """Sums of a square array over 2 * window + 1 places along its diagonals, where they lie inside."""
+    """Sum a square array over 2 * window + 1 places along its diagonals, where they lie inside."""
     size = len(values) - 2 * window
     return sum((values[k : k + size, k : k + size] for k in range(2 * window + 1)), np.zeros(()))

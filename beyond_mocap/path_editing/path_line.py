@@ -1,5 +1,6 @@
-"""Drawn lines as paths: polylines, dense or of a few corners, rounded to curves that a body can go along; tables of
-points `x_m,y_m[,z_m]`; and B-splines by their control points (Path editing §4.6.6)."""
+"""Drawn lines as paths: dense or sparse polylines rounded to curves that a body can follow; tables of points
+`x_m,y_m[,z_m]`; and B-splines with control points (Path editing §4.6.6).
+"""
 
 from __future__ import annotations
 
@@ -16,15 +17,15 @@ from ..motion.path.path import Path, SplinePath
 from ..motion.path.smooth_spline import smoothing_spline
 
 ROUNDING = 0.15
-"""Metres over which corners are rounded, some."""
+"""Metres over which corners are rounded, about."""
 SHORTEST = 0.2
-"""Metres that a line has at least."""
+"""Metres that a line needs at least."""
 _SAMPLE = 1 / 4  # of the rounding, between samples of the line
 _PIECE = 1 / 2  # of the rounding, a piece of the spline
 _LONGEST = 5000  # roundings: longer lines are rounded more
-_HAIRPIN = 5.0  # roundings from where a line turns back to where it begins to swing out
-_LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # value of x (1 - x^2)^3
-_ORDER = 3  # the change of the bend is what costs, so that a bend that stays is kept to the line's very ends
+_HAIRPIN = 5.0  # roundings from the tip of a hairpin to where the line starts to swing out
+_LARGEST = (6 / 7) ** 3 / np.sqrt(7)  # largest value of x (1 - x^2)^3
+_ORDER = 3  # the change of curvature has a cost, so that a constant curvature is kept up to the line's ends
 
 COLUMNS = ("x_m", "y_m", "z_m")
 _SHORT = {name[0]: name for name in COLUMNS}
@@ -32,12 +33,21 @@ _LEAST_METRES, _MOST_METRES = 1e-6, 1e5  # of a table
 
 
 def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: bool = False) -> SplinePath:
-    """The path along a polyline (N, 3) in metres, its parameter about metres along it.
+    """Fit a smooth path along a polyline; its parameter is about metres along it.
 
-    name: for messages. Points that repeat each other are dropped; corners are rounded over some `rounding` metres;
-    smooth lines of radius 1 m or more are kept within a millimetre (up to 750 m of them), and an open line's ends
-    exactly. closed: the last point is joined to the first. InputError for fewer than two different points, values that
-    are not finite, lines shorter than SHORTEST."""
+    Repeated points are dropped. Corners are rounded over some `rounding` metres; smooth lines of radius 1 m or more are
+    kept within a millimetre (up to 750 m of them), and the ends of an open line exactly.
+
+    Args:
+        line: (N, 3) metres.
+        name: of the line, for messages.
+        rounding: metres.
+        closed: join the last point to the first.
+    Returns:
+        The spline path.
+    Raises:
+        InputError: for fewer than two different points, values that are not finite, or lines shorter than SHORTEST.
+    """
     line = _checked(line, name, closed)
     length = distance_along(line)[-1]
     rounding = max(min(rounding, length / 12), length / _LONGEST)
@@ -54,12 +64,19 @@ def through(line: np.ndarray, name: str, rounding: float = ROUNDING, closed: boo
 
 
 def b_spline(points: np.ndarray, degree: int) -> SplinePath:
-    """The B-spline of control points (P, 3) in metres that begins at the first and ends at the last; its parameter is 0
-    to 1.
+    """Build the B-spline of control points; it starts at the first and ends at the last, its parameter is 0 to 1.
 
-    Knots: each end's repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one, which
-    does not add up). InputError where the degree is below 1 or not below P, and where `through` refuses the control
-    points."""
+    Knots: those of each end repeated degree + 1 times, the others even: P + degree + 1 of them (§4.6.6 says minus one,
+    which cannot be).
+
+    Args:
+        points: (P, 3) metres.
+        degree: 1 or more, less than P.
+    Returns:
+        The spline path.
+    Raises:
+        InputError: for another degree, or for points that `fit_line` rejects.
+    """
     points = np.asarray(points, dtype=float)
     _checked(points, "control points", closed=False)
     _check_degree(len(points), degree)
@@ -67,10 +84,19 @@ def b_spline(points: np.ndarray, degree: int) -> SplinePath:
 
 
 def control_points(path: Path, count: int, degree: int) -> np.ndarray:
-    """The control points (count, 3) in metres of the B-spline nearest to a path, whose ends it meets; see `b_spline`.
+    """Fit the control points of the B-spline nearest to a path, with the same ends.
 
-    Least squares over even steps of arc length, so that control points lie even too. InputError as there for the
-    degree."""
+    Least squares over even steps of arc length, so that control points are even too.
+
+    Args:
+        path: to approximate.
+        count: of control points.
+        degree: 1 or more, less than `count`.
+    Returns:
+        (count, 3) metres, for `build_b_spline`.
+    Raises:
+        InputError: for another degree.
+    """
     from scipy.interpolate import BSpline
 
     _check_degree(count, degree)
@@ -84,9 +110,18 @@ def control_points(path: Path, count: int, degree: int) -> np.ndarray:
 
 
 def straight(path: Path, count: int) -> np.ndarray:
-    """Even control points (count, 3) in metres from where a path begins to where it ends: a neutral start (§4.6.6).
+    """Build even control points on a straight line from the start of a path to its end: a neutral start (§4.6.6).
 
-    Where it ends where it begins, to its farthest place. InputError for fewer than two."""
+    If the path ends where it starts, the line leads to its farthest place.
+
+    Args:
+        path: whose ends are used.
+        count: of control points.
+    Returns:
+        (count, 3) metres.
+    Raises:
+        InputError: for fewer than two points.
+    """
     _check_degree(count, 1)
     places, _ = _even_places(path, 200)
     first, last = places[0], places[-1]
@@ -96,19 +131,19 @@ def straight(path: Path, count: int) -> np.ndarray:
 
 
 def _check_degree(count: int, degree: int) -> None:
-    """InputError where a B-spline of `count` control points cannot have this degree."""
+    """Raise InputError if a B-spline of `count` control points cannot have this degree."""
     if not 1 <= degree < count:
-        raise InputError("control points", f"{count} of them for degree {degree}", f"{max(degree, 1) + 1} at least",
-                         "take more points or a lower degree")
+        raise InputError("control points", f"{count} points for degree {degree}", f"{max(degree, 1) + 1} or more",
+                         "use more points or a lower degree")
 
 
 def _even_knots(count: int, degree: int) -> np.ndarray:
-    """(count + degree + 1,) knots from 0 to 1."""
+    """Build (count + degree + 1,) knots from 0 to 1."""
     return np.concatenate([np.zeros(degree), np.linspace(0.0, 1.0, count - degree + 1), np.ones(degree)])
 
 
 def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Places (count, 3) at even steps of arc length, and the share (count,) of the way."""
+    """Sample places (count, 3) at even steps of arc length, with their share (count,) of the path."""
     share, arc = np.linspace(0.0, 1.0, count), ArcLength(path)
     u = arc.parameter(share * arc.length)
     u[-1] = path.domain[1] - (1e-12 * (path.domain[1] - path.domain[0]) if path.closed else 0.0)
@@ -116,26 +151,26 @@ def _even_places(path: Path, count: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _checked(line: np.ndarray, name: str, closed: bool) -> np.ndarray:
-    """The line without points that repeat the one before, closed where asked; or InputError."""
+    """Check a line; return it without repeated points, closed if requested, or raise InputError."""
     line = np.asarray(line, dtype=float)
     if line.ndim != 2 or line.shape[1] != 3:
-        raise InputError(name, f"an array of shape {line.shape}", "points of three coordinates")
+        raise InputError(name, f"is an array of shape {line.shape}", "points with three coordinates")
     if not np.isfinite(line).all():
         where = np.flatnonzero(~np.isfinite(line).all(axis=1))[0]
-        raise InputError(name, f"point {where + 1} is not finite", "metres")
+        raise InputError(name, f"point {where + 1} is not finite", "finite coordinates in metres")
     if closed and len(line):
         line = np.concatenate([line, line[:1]])
     if len(line):
         line = line[np.append(True, np.linalg.norm(np.diff(line, axis=0), axis=1) > 1e-9)]
     if len(line) < 2:
-        raise InputError(name, "all its points are one", "two different points at least", "draw it longer")
+        raise InputError(name, "all points are equal", "at least two different points", "draw a longer line")
     if (length := distance_along(line)[-1]) < SHORTEST:
-        raise InputError(name, f"it is {length:.3g} m long", f"{SHORTEST} m at least", "draw it longer")
+        raise InputError(name, f"is {length:.3g} m long", f"{SHORTEST} m or more", "draw a longer line")
     return line
 
 
 def _thinned(line: np.ndarray, step: float) -> np.ndarray:
-    """Points denser than `step` metres averaged over it, so that their noise does not make the line longer."""
+    """Average points denser than `step` metres, so that their noise does not lengthen the line."""
     along = distance_along(line)
     cell = np.floor(along / step).astype(int)
     first = np.flatnonzero(np.diff(cell, prepend=-1))
@@ -148,16 +183,19 @@ def _thinned(line: np.ndarray, step: float) -> np.ndarray:
 
 
 def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed: bool) -> np.ndarray:
-    """Samples (M, 3) with room to turn round where the line, `along` (M,) metres, turns by more than a right angle.
+    """Add room to turn (M, 3) where the line, `along` (M,) metres, turns by more than a right angle.
 
-    On the way in they swing out to the outer side, on the way back to the inner one, by up to `rounding` metres: a line
-    that goes back where it came from would have to stop and turn on the spot."""
+    Before the tip the line swings to the outer side, after it to the inner one, by up to `rounding` metres: a body on a
+    line that reverses would have to stop and turn on the spot.
+    """
     step, count = along[1], len(line) - closed
     reach = max(int(round(rounding / step)), 1)
     inner = np.arange(count) if closed else np.arange(reach, count - reach)
     came, goes = _directions(line, inner, reach, count)
     excess = np.zeros(count)
     excess[inner] = np.arccos(np.clip(np.einsum("mi,mi->m", came, goes), -1.0, 1.0)) / (np.pi / 2) - 1.0
+    # `excess`: angle beyond a right one, in right angles. Closed lines are rolled so that no turn spans the array's
+    # end.
     first = int(np.argmin(excess)) if closed else 0  # no turn there
     turns = [np.arange(*turn) + first for turn in runs(np.roll(excess, -first) > 0.0)]
     if not turns:
@@ -176,23 +214,28 @@ def _with_hairpins(line: np.ndarray, along: np.ndarray, rounding: float, closed:
 
 
 def _directions(line: np.ndarray, at: np.ndarray, reach: int, period: int) -> tuple[np.ndarray, ...]:
-    """Unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
+    """Compute unit directions (M, 3) from `reach` samples before to samples `at` (M,), and from there to `reach` after.
 
-    period: samples in a round, for closed lines."""
+    period: samples of a lap, for closed lines.
+    """
     before, after = (at - reach) % period, (at + reach) % period
     chords = line[at] - line[before], line[after] - line[at]
     return tuple(unit_vectors(chord, least=1e-12) for chord in chords)
 
 
 def _room(places: np.ndarray, length: float, closed: bool) -> np.ndarray:
-    """Metres (P,) from each turn to the nearest other or to the line's end; places (P,) metres along it, rising."""
+    """Measure the metres (P,) from each turn to the next one or to the line's end; places (P,) metres along it,
+    rising.
+    """
     before = places[-1] - length if closed else 0.0
     after = places[0] + length if closed else length
     return np.minimum(np.diff(places, prepend=before), np.diff(places, append=after))
 
 
 def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
-    """The horizontal unit vector (3,) to the side to which a line turns that came and goes in directions (3,)."""
+    """Compute the horizontal unit vector (3,) to the side to which a line turns, from its directions before and
+    after.
+    """
     side = np.array([goes[1] - came[1], came[0] - goes[0], 0.0])  # left of the turn's tip
     size = np.linalg.norm(side)
     side = side / size if size > 1e-6 else np.array([1.0, 0.0, 0.0])
@@ -200,19 +243,26 @@ def _aside(came: np.ndarray, goes: np.ndarray) -> np.ndarray:
 
 
 def _resampled(line: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
-    """Even samples (M, 3) of a polyline about `step` metres apart, and metres (M,) along it."""
+    """Resample a polyline evenly: samples (M, 3) about `step` metres apart, and metres (M,) along it."""
     along = distance_along(line)
     even = np.linspace(0.0, along[-1], max(int(np.ceil(along[-1] / step)) + 1, 16))
     return interpolate(even, along, line), even
 
 
 def read_curve(path: str | os.PathLike) -> np.ndarray:
-    """(N, 3) metres, N >= 2: the points of a CSV file in the order of its rows, in the pitch's frame, z 0 where the
-    column is missing; other columns are ignored. The columns may also be named x, y and z, and be separated by
-    semicolons or tabs; then numbers may have decimal commas.
+    """Read the points of a path from a CSV file, in the order of its rows.
 
-    InputError, with the line, where a cell is no number or lies beyond 10 km; where fewer than two different points are
-    given, or more than 100 km in all."""
+    z is 0 if the column is missing; other columns are ignored. Columns may also be named x, y and z, and be separated
+    by semicolons or tabs; then numbers may have decimal commas.
+
+    Args:
+        path: of the file.
+    Returns:
+        (N, 3) metres, N >= 2, pitch frame.
+    Raises:
+        InputError: with the line, if a cell is not a number or is beyond 10 km; if the file has fewer than two
+            different points, or more than 100 km of path.
+    """
     names, points = COLUMNS[:2], []
     for place, row in read_rows(path, names, _SHORT, ",;\t"):
         if not points:
@@ -223,7 +273,7 @@ def read_curve(path: str | os.PathLike) -> np.ndarray:
         line[:, : len(names)] = points
     if not len(line) or np.ptp(line, axis=0).max() < _LEAST_METRES:
         what = f"{len(line)} points, all at one place" if len(line) > 1 else f"{len(line)} points"
-        raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] that lie apart", "add points")
+        raise InputError(path, what, "at least two rows under x_m,y_m[,z_m] with different places", "add points")
     if (length := np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) > _MOST_METRES:
         most = f"at most {_MOST_METRES / 1000:.0f} km"
         raise InputError(path, f"a path of {length / 1000:.0f} km", most, "check the unit")

@@ -1,7 +1,7 @@
-"""How well a recording rides another path: on the path, at its speed, on its feet, smoothly; its own figures beside.
+"""Evaluate a path edit: distance from the path, speed, feet and smoothness, beside the figures of the recording itself.
 
-`source` and `ridden` are what the recipe `ride` takes and gives (`RideSource`, `Ridden`); only their arrays are used.
-Definitions are those of `../shared/metrics.md`: the root is the pelvis behind a zero-phase Hann window of 1.5 s.
+`source` and `edited` are a `PathEditSource` and an `EditedMotion`; only their arrays are used. Definitions are those of
+`../shared/metrics.md`: the root is the pelvis behind a zero-phase Hann window of 1.5 s.
 """
 
 from __future__ import annotations
@@ -16,16 +16,24 @@ from ..motion.motion import Motion, forward_kinematics
 from ..motion.track import zero_phase_hann
 from ..synthesis.quality import movement
 
-MISSED = 0.005  # m beside its target from which a limb counts as not having reached it
+MISSED = 0.005  # m from its target beyond which a limb counts as not reaching it
 _DENSE = 0.01  # metres between the places of the path that a pelvis is compared with
-_MOVING = 0.3  # m/s below which a body stands, and no speed is kept
+_MOVING = 0.3  # m/s below which a body counts as standing still, and its speed is not compared
 
 
 def figures(source, ridden, path, ground=None) -> dict:
-    """All figures, None where nothing is known, as where the skeleton is no human body's. `before`: not yet planted.
+    """Measure all figures of a path edit.
 
-    path: the new path. ground: the Terrain that it stood on, None for the path's own height. Of a motion that begins
-    anew with its path only the first time is looked at: the others are the same, with a cut between."""
+    Of a motion that restarts with its path only the first lap is evaluated: the others are equal, with a cut between.
+
+    Args:
+        source: the motion relative to its own path.
+        edited: the motion on the new path.
+        path: the new path.
+        ground: the mesh that the feet followed; None for the path's own height.
+    Returns:
+        Figures by name, None where unknown, such as feet of a skeleton without legs. `before`: before planting.
+    """
     ridden = ridden.once
     pelvis, own = (_pelvis(motion, source.humanoid) for motion in (ridden.motion, source.motion))
     frames = np.clip(np.rint(ridden.frames).astype(int), 0, len(source.motion) - 1)
@@ -43,22 +51,28 @@ def figures(source, ridden, path, ground=None) -> dict:
 
 
 def _pelvis(motion: Motion, humanoid: bool) -> np.ndarray:
-    """Places (T, 3) m of the hips, of the root where there are none."""
+    """Compute the places (T, 3) m of the hips, or of the root without any."""
     hips = identify(motion.skeleton).hips if humanoid else 0
     return motion.root_positions if hips == 0 else forward_kinematics(motion)[0][:, hips]
 
 
 def _own_error(source, own: np.ndarray) -> np.ndarray:
-    """Distance (T,) m of the recording's root from its own path."""
+    """Measure the distance (T,) m of the recording's root from its own path."""
     times = np.arange(len(own)) / source.motion.fps
     return movement.root_error(own[:, :2], source.path.at(times)[:, :2], source.motion.fps)
 
 
 def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndarray:
-    """Distance (T,) m of the root, pelvis (T, 2) behind the window, from the path's nearest point, behind the same
-    window.
+    """Measure the distance of the root from the nearest point of the path, behind the same window.
 
-    origin (T, 2) m: where on the path the ride was; what of the path it never came to is left as it is."""
+    Args:
+        pelvis: (T, 2) metres, before the window.
+        origin: (T, 2) metres, places on the path that the edited motion passed; the rest of the path is not smoothed.
+        path: the new path.
+        fps: frames per second.
+    Returns:
+        (T,) metres.
+    """
     low, high = path.domain
     line = path.at(np.linspace(low, high, 4001))[:, :2]
     way = np.concatenate([zero_phase_hann(origin, fps, movement.ROOT_WINDOW), line])
@@ -67,7 +81,7 @@ def nearest(pelvis: np.ndarray, origin: np.ndarray, path, fps: float) -> np.ndar
 
 
 def _filled(line: np.ndarray) -> np.ndarray:
-    """Places (M, 2) at most 1 cm apart along a line (T, 2); jumps of more than half a metre are left open."""
+    """Interpolate places (M, 2) at most 1 cm apart along a line (T, 2); jumps of more than half a metre stay open."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     counts = np.where(steps < 0.5, np.maximum(steps / _DENSE, 1.0), 1.0).astype(int)
     shares = [np.arange(count) / count for count in counts]
@@ -76,10 +90,20 @@ def _filled(line: np.ndarray) -> np.ndarray:
 
 
 def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.ndarray) -> dict:
-    """Arc length per frame against the recording's at the frame that is shown: shares by which it is off, where the
-    recording moves and nothing is joined. Played twice as fast it is off by 1.
+    """Measure how well the edited motion keeps the recorded speed.
 
-    path: of the path; body: of the pelvis behind the window, which in bends is shorter by what the window cuts off."""
+    Arc length per frame against that of the recording at the displayed frame: relative errors, where the recording
+    moves and no transition is near. Played twice as fast, the error is 1.
+
+    Args:
+        source: the motion relative to its own path.
+        edited: the motion on the new path.
+        own: (S, 3) metres, the recording's pelvis.
+        pelvis: (T, 3) metres, the edited motion's pelvis.
+        frames: (T,) nearest source frames.
+    Returns:
+        `path`: of the path; `body`: of the pelvis behind the window, which shortens bends.
+    """
     fps, there = ridden.motion.fps, np.arange(len(frames) - 1)
     middle = 0.5 * (ridden.frames[1:] + ridden.frames[:-1])
     ends = np.clip((middle + [[-0.5], [0.5]]) / source.motion.fps, *source.path.domain)
@@ -99,7 +123,7 @@ def kept_speed(source, ridden, own: np.ndarray, pelvis: np.ndarray, frames: np.n
 
 
 def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
-    """Jerk at the seams of a ride that cycles, against what the recording itself has at that speed."""
+    """Measure the jerk at the transitions of a cycled motion, against that of the recording at the same speed."""
     seams = np.asarray(ridden.seams, int)
     mine, his = (movement.jerk(forward_kinematics(m)[0], m.fps) for m in (ridden.motion, source.motion))
     speed = movement.travel_speed(own[:, :2], source.motion.fps)
@@ -112,7 +136,9 @@ def _seams(source, ridden, own: np.ndarray, pelvis: np.ndarray) -> dict:
 
 
 def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
-    """Skate on carried contacts in the recording, before planting and after; stances, the ground, what planting did."""
+    """Measure foot slide, ground and corrections: in the recording, before planting and after, with the carried
+    contacts.
+    """
     points, own_points = carried(ridden), source.standing
     own, mine = _foot_places(source.motion), _foot_places(ridden.motion)
     used = np.unique(frames)
@@ -132,21 +158,28 @@ def _feet(source, ridden, frames: np.ndarray, ground) -> dict:
 
 
 def carried(ridden) -> np.ndarray:
-    """(T, 2, 2) bool: which points of the feet stand, without the frames in which the ride begins again at the path's
-    beginning: nobody stands while he is set elsewhere."""
+    """Compute the contacts of the edited motion, without the frames in which it restarts at the start of the path.
+
+    Args:
+        edited: the motion on the new path.
+    Returns:
+        (T, 2, 2) bool.
+    """
     points = ridden.standing.copy()
     points[1:][np.diff(ridden.arc) < 0.0] = False
     return points
 
 
 def _foot_places(motion: Motion) -> np.ndarray:
-    """(T, 2, 2, 3) m: side, heel and toe."""
+    """Compute the places of the feet (T, 2, 2, 3) m: side, heel and toe."""
     return forward_kinematics(motion)[0][:, movement.foot_joints(motion.skeleton)]
 
 
 def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: np.ndarray | None = None) -> dict:
-    """Mean speed of standing feet (flat: heel and toe stand) and of standing points, cm/s; how far toes travel within a
-    stance, mm. used: frames that count, None for all."""
+    """Measure foot slide: speeds of flat feet and of points in contact, cm/s, and the travel of toes in a stance, mm.
+
+    Flat: heel and toe are in contact. used: frames that count, None for all.
+    """
     flat = points.all(axis=2)
     speeds = movement.contact_speeds(places, flat, fps)
     point = np.linalg.norm(np.diff(places[..., :2], axis=0), axis=-1) * fps
@@ -161,10 +194,12 @@ def _skate(name: str, places: np.ndarray, points: np.ndarray, fps: float, used: 
 
 
 def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray, recording: Motion, ground) -> dict:
-    """Heights of soles above the surface, mm: the deepest of any foot, the highest and the usual of standing ones.
+    """Measure the heights of soles above the surface, mm: the deepest of any foot, the highest and usual of feet in
+    contact.
 
     The surface is that of `ground` under each foot; without it the path's own height where the path, origin (T, 3) m,
-    is nearest. A sole's height is that of its joints less what they have in the recording while the foot stands flat.
+    is nearest. A sole's height is that of its joints less their height in the recording while the foot is flat on the
+    ground.
     """
     surface = _surface(places, origin, ground)
     above = places - surface[..., None] * [0.0, 0.0, 1.0]
@@ -180,7 +215,7 @@ def _ground(name: str, places: np.ndarray, flat: np.ndarray, origin: np.ndarray,
 
 
 def _surface(places: np.ndarray, origin: np.ndarray, ground) -> np.ndarray:
-    """Height (T, 2, 2) m of the surface under places (T, 2, 2, 3)."""
+    """Compute the height (T, 2, 2) m of the surface under places (T, 2, 2, 3)."""
     flat = places.reshape(-1, 3)
     if ground is not None:
         return np.asarray(ground.heights(flat[:, :2], flat[:, 2] + 0.5)[0]).reshape(places.shape[:-1])
@@ -190,8 +225,10 @@ def _surface(places: np.ndarray, origin: np.ndarray, ground) -> np.ndarray:
 
 
 def _nearest_in_time(places: np.ndarray, origin: np.ndarray, reach: int = 90) -> np.ndarray:
-    """Index (T, 2, 2) of the nearest place of the way (T, 3), over the ground, within `reach` frames: a path may cross
-    itself at another height."""
+    """Find the index (T, 2, 2) of the nearest place of the path (T, 3) over the ground.
+
+    Within `reach` frames only, since a path can cross itself at another height.
+    """
     count = len(origin)
     best, index = np.full(places.shape[:-1], np.inf), np.zeros(places.shape[:-1], int)
     for shift in range(-reach, reach + 1):
@@ -203,7 +240,15 @@ def _nearest_in_time(places: np.ndarray, origin: np.ndarray, reach: int = 90) ->
 
 
 def knee_jerk(source, ridden, frames: np.ndarray) -> dict:
-    """The knees' third difference, its 99th percentile and largest, over the recording's own in the frames it used."""
+    """Measure the third difference of the knees against that of the recording in the frames used.
+
+    Args:
+        source: the motion relative to its own path.
+        edited: the motion on the new path.
+        frames: (T,) nearest source frames.
+    Returns:
+        Ratios of the 99th percentiles and of the largest values.
+    """
     body = identify(source.motion.skeleton)
     knees = [body.left.lower_leg, body.right.lower_leg]
     mine, his = (movement.jerk(forward_kinematics(m)[0][:, knees], m.fps) for m in (ridden.motion, source.motion))

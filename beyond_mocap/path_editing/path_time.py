@@ -1,18 +1,18 @@
-"""When a rider is where on its new path, and which frame of its motion it shows there.
+"""The timing of a path edit: where on its new path the body is in each frame, and which source frame it displays.
 
-By arc length (Path editing §3.2) the new path is passed as fast as the motion passed its own; by time (figure 3.8) each
-path is passed within the same time, however long it is. A speed factor plays the motion faster or slower; the frames
-shown then lie between recorded ones.
+By arc length (Path editing §3.2) the body passes the new path as fast as the motion passed its own path; by time
+(figure 3.8) each path takes the same time, whatever its length. A speed factor plays the motion faster or slower; the
+displayed frames are then between recorded ones.
 
-By arc length the new path may also ask for other steps than its own did. Uphill and downhill steps are shorter and
-quicker, the speed stays (runners at a given speed: Padulo et al. 2012, "Kinematics of running at different slopes and
-speeds"; walkers downhill: Kawamura et al. 1991). Who wishes it goes slower there, by Tobler's hiking function (Tobler
-1993), and slower in tight bends, by the two-thirds power law (Lacquaniti et al. 1983; of walkers: Vieilledent et al.
-2001); half of that are shorter steps and half a slower tempo, as people keep the ratio of the two when they slow down
-(Sekiya et al. 1996, the walk ratio).
+By arc length the new path may also change the steps. Uphill and downhill steps are shorter and quicker at the same
+speed (runners at a given speed: Padulo et al. 2012, "Kinematics of running at different slopes and speeds"; walkers
+downhill: Kawamura et al. 1991). Two options slow the body down: on slopes by Tobler's hiking function (Tobler 1993),
+and in tight bends by the two-thirds power law (Lacquaniti et al. 1983; of walkers: Vieilledent et al. 2001). Half of
+that are shorter steps and half a slower tempo, since people keep the ratio of the two when they slow down (Sekiya et
+al. 1996, the walk ratio).
 
-Where a path ends before the motion does, the motion stops there or begins again with the path (§3.2.3); a closed path
-has no end: the motion goes round and round.
+Where a path ends before the motion does, the motion stops there or restarts with the path (§3.2.3). A closed path has
+no end: the motion goes round and round.
 """
 
 from __future__ import annotations
@@ -31,27 +31,33 @@ from ..motion.track import zero_phase_hann
 from .path_frame import Residuals
 
 SHORTER = 0.4
-"""By how much steps are shorter on slopes: this times the slope, as a share."""
+"""Share by which steps are shorter on slopes: this times the slope."""
 BEND = 2.0
-"""Metres of radius below which bends slow."""
+"""Metres of radius below which bends slow the body down."""
 LEAST_STEP, LEAST_SPEED = 0.8, 0.35
-"""Shares of a step's length on the level, and of the speed, that are kept at least."""
+"""Lower limits: of a step's length, as a share of that on level ground, and of the speed."""
 _GRID = 0.05  # metres
-_SMOOTH = 0.7  # metres of path over which slopes and bends are felt
-_STRIDE_SECONDS, _CREEPS = 0.5, 0.05  # s over which a stride is told, m/s that say nothing about it
-_MOVES = 0.4  # m/s; whoever is slower tells nothing about bends
+_SMOOTH = 0.7  # metres of path over which slopes and bends are averaged
+_STRIDE_SECONDS, _CREEPS = 0.5, 0.05  # s over which strides are averaged; m/s added so that creeping has no ratio
+_MOVES = 0.4  # m/s; below it a motion's own bends are ignored
 
 REACHED = 1e-3
-"""Metres by which a motion may overshoot the path and still be of its length."""
+"""Metres by which a motion may overshoot the path and still count as of its length."""
 SHORTEST = 1e-6
-"""Metres that a path is long at least."""
-_STEP = 0.5  # metres; a path or lap shorter than this is told
-_SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: of a lap that is begun anew, and of a motion's end that nobody misses
+"""Metres below which a path has no length."""
+_STEP = 0.5  # metres; a shorter path gets a warning
+_SHORTEST_LAP, _UNSEEN = 0.5, 0.1  # seconds: shortest lap that is repeated; longest cut end without a warning
 
 
 @dataclass(frozen=True)
 class Wishes:
-    """Whether steps are shorter on slopes, and whether slopes and bends slow."""
+    """Options of how the new path changes the steps.
+
+    Attributes:
+        slopes: steps are shorter on slopes.
+        climbs: slopes slow the body down.
+        bends: tight bends slow the body down.
+    """
 
     slopes: bool = False
     climbs: bool = False
@@ -59,57 +65,92 @@ class Wishes:
 
     @property
     def none(self) -> bool:
+        """Whether no option is on."""
         return not (self.slopes or self.climbs or self.bends)
 
 
 @dataclass(frozen=True, eq=False)
 class Way:
-    """What a path is like, for steps: slope (N,), the tangent's rise over the ground, and bend (N,), 1 / m over the
-    ground, at arc (N,) m."""
+    """Slope and curvature along a path.
+
+    Attributes:
+        arc: (N,) metres along the path.
+        slope: (N,) rise of the tangent over its horizontal length.
+        bend: (N,) 1 / m, curvature over the ground, never negative.
+    """
 
     arc: np.ndarray
     slope: np.ndarray
     bend: np.ndarray
 
     def plain(self, wishes: Wishes) -> bool:
-        """Whether wishes change nothing on it."""
+        """Return whether these options leave all steps on the path unchanged."""
         length, tempo = _steps(self, wishes)
         return bool(max(np.abs(length - 1.0).max(), np.abs(tempo - 1.0).max()) < 1e-4)
 
 
 @dataclass(frozen=True, eq=False)
 class Timing:
-    """N output frames: at (N,) the row of the residuals that is shown, fractional; arc (N,) m of the new path."""
+    """The timing of N output frames.
+
+    Attributes:
+        at: (N,) row of the residuals that is displayed, fractional.
+        arc: (N,) metres along the new path.
+    """
 
     at: np.ndarray
     arc: np.ndarray
 
     def first(self, count: int) -> Timing:
-        """Its first `count` frames."""
+        """Select the first `count` frames."""
         return Timing(self.at[:count], self.arc[:count])
 
 
 def by_arc_length(residuals: Residuals, speed: float, delay: float) -> Timing:
-    """The motion `speed` times as fast as it was recorded, `delay` seconds later; it waits in its first frame."""
+    """Build the timing of a motion that keeps its speed on the new path.
+
+    Args:
+        residuals: the motion relative to its own path.
+        speed: playback rate, 1 as recorded.
+        delay: seconds for which the body waits in its first frame.
+    Returns:
+        Row and arc length of each output frame.
+    """
     at = _played(len(residuals), speed, delay, residuals.fps)
     return Timing(at, np.interp(at, np.arange(len(residuals)), np.cumsum(residuals.step)))
 
 
 def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: float, delay: float,
            closed: bool) -> Timing:
-    """As `by_arc_length`, with the steps that the new path asks for beyond what its own, `own` at every row, did.
+    """Build the timing by arc length with the steps that the slopes and bends of the new path require.
 
-    The length s run on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS /
-    k_own(p), dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two sums and two inversions."""
+    The length s on the new path, the length S of the motion and its row p at time t follow ds / k(s) = dS / k_own(p),
+    dt = dp r_own(p) / r(s), with the lengths k and the tempo r of steps: two cumulative sums and two inversions.
+
+    Args:
+        residuals: the motion relative to its own path.
+        own: profile of the motion's own path, at each row.
+        new: profile of the new path.
+        options: what changes the steps.
+        speed: playback rate, 1 as recorded.
+        delay: seconds for which the body waits in its first frame.
+        closed: whether the new path is closed.
+    Returns:
+        Row and arc length of each output frame.
+    """
     k_own, r_own = _steps(own, wishes)
     k, r = _steps(new, wishes)
+    # Metres in steps of unit length, on the motion's side; the path's side is `run`, over as many laps as can be
+    # needed.
     asked = np.cumsum(residuals.step / k_own)
     laps = int(np.ceil(asked[-1] / max((new.arc[-1] - new.arc[0]) * LEAST_SPEED, 1e-9))) + 1 if closed else 1
     arc = np.concatenate([new.arc + lap * new.arc[-1] for lap in range(laps)])
     k, r = np.tile(k, laps), np.tile(r, laps)
     run = np.concatenate([[0.0], np.cumsum(np.diff(arc) * 0.5 * (1.0 / k[1:] + 1.0 / k[:-1]))])
+    # Beyond the end of an open path the last step length holds.
     beyond = np.maximum(asked - run[-1], 0.0) * k[-1]
     s = np.interp(asked, run, arc) + beyond
+    # `clock` is the output frame at which each row is reached; inverted it gives the row of each output frame.
     pace = speed * np.interp(s, arc, r) / r_own
     clock = np.concatenate([[0.0], np.cumsum(2.0 / (pace[1:] + pace[:-1]))])
     waits = np.zeros(int(round(delay * residuals.fps)))
@@ -119,7 +160,16 @@ def by_way(residuals: Residuals, own: Way, new: Way, wishes: Wishes, speed: floa
 
 
 def asked_length(residuals: Residuals, own: Way, new: Way, wishes: Wishes) -> float:
-    """Metres that a motion goes in its own steps while it passes the whole of a new way; own: its own at every row."""
+    """Compute how far a motion moves, in its own steps, while it passes the whole new path.
+
+    Args:
+        residuals: the motion relative to its own path.
+        own: profile of the motion's own path, at each row.
+        new: profile of the new path.
+        options: what changes the steps.
+    Returns:
+        Metres.
+    """
     k, _ = _steps(new, wishes)
     level = np.sum(residuals.step / _steps(own, wishes)[0])
     recorded = residuals.step.sum() / level if level > 0.0 else 1.0
@@ -127,7 +177,14 @@ def asked_length(residuals: Residuals, own: Way, new: Way, wishes: Wishes) -> fl
 
 
 def way_of(path: Path, arc: ArcLength) -> Way:
-    """What a path is like, every few centimetres, smoothed over what a step feels."""
+    """Build the profile of a path every few centimetres, smoothed over the length of a step.
+
+    Args:
+        path: the path.
+        arc: its arc length.
+    Returns:
+        Slope and curvature at even arc lengths.
+    """
     count = int(np.clip(arc.length / _GRID, 8, 8000)) + 1
     s = np.linspace(0.0, arc.length, count)
     u = arc.parameter(s)
@@ -142,16 +199,24 @@ def way_of(path: Path, arc: ArcLength) -> Way:
 
 
 def way_at(way: Way, arc: np.ndarray, pace: np.ndarray) -> Way:
-    """The same at arc (T,) m passed at `pace` (T,) m/s: whoever stands goes no bend."""
+    """Sample a profile where a motion is; a body slower than _BEND_SPEED has no curvature.
+
+    Args:
+        profile: of the path.
+        arc: (T,) metres along it.
+        pace: (T,) m/s.
+    Returns:
+        The profile at each of the T frames.
+    """
     bend = np.where(pace > _MOVES, np.interp(arc, way.arc, way.bend), 0.0)
     return Way(arc, np.interp(arc, way.arc, way.slope), bend)
 
 
 def _steps(way: Way, wishes: Wishes) -> tuple[np.ndarray, np.ndarray]:
-    """Length and tempo of steps (N,) as shares of those on a level straight path."""
+    """Compute length and tempo of steps (N,) as shares of those on a level straight path."""
     shorter = np.maximum(1.0 - SHORTER * np.abs(way.slope), LEAST_STEP) if wishes.slopes else np.ones(len(way.slope))
     slower = np.ones(len(way.slope))
-    if wishes.climbs:  # 6 exp(-3.5 |m + 0.05|) km/h
+    if wishes.climbs:  # Tobler: 6 exp(-3.5 |m + 0.05|) km/h, over its value on level ground
         slower = slower * np.exp(-3.5 * (np.abs(way.slope + 0.05) - 0.05))
     if wishes.bends:
         slower = slower * np.maximum(way.bend * BEND, 1.0) ** (-1.0 / 3.0)
@@ -160,20 +225,37 @@ def _steps(way: Way, wishes: Wishes) -> tuple[np.ndarray, np.ndarray]:
 
 
 def by_time(residuals: Residuals, path: Path, arc: ArcLength, speed: float, delay: float) -> Timing:
-    """The same on a path whose parameter runs with time, from end to end within the motion."""
+    """Build the timing of a motion that passes the whole path within its own duration.
+
+    Args:
+        residuals: the motion relative to its own path.
+        path: the new path, whose parameter runs with time.
+        arc: its arc length.
+        speed: playback rate, 1 as recorded.
+        delay: seconds for which the body waits in its first frame.
+    Returns:
+        Row and arc length of each output frame.
+    """
     at = _played(len(residuals), speed, delay, residuals.fps)
     return Timing(at, arc.at(parameter_at(path, at / max(len(residuals) - 1, 1))))
 
 
 def parameter_at(path: Path, share: np.ndarray) -> np.ndarray:
-    """The path's parameters (N,) when a share (N,) of the time is over."""
+    """Compute the path's parameters (N,) at shares (N,) of the time, from 0 to 1."""
     low, high = path.domain
     return low + (high - low) * share
 
 
 def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None:
-    """(T,) how many times as long as recorded the steps of a motion are that goes new (T,) m over the ground from frame
-    to frame, where it went own (T,) m; None where they are as they were."""
+    """Compute how many times as long as recorded the steps of a motion are.
+
+    Args:
+        new: (T,) metres over the ground since the frame before, on the new path.
+        own: (T,) metres over the ground since the frame before, as recorded.
+        fps: frames per second.
+    Returns:
+        (T,) ratios; None if steps are as recorded.
+    """
     if np.abs(new - own).max(initial=0.0) < 1e-4 / fps:
         return None
     both = zero_phase_hann(np.stack([new, own], axis=1), fps, _STRIDE_SECONDS) + _CREEPS / fps
@@ -181,9 +263,17 @@ def stretched(new: np.ndarray, own: np.ndarray, fps: float) -> np.ndarray | None
 
 
 def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
-    """The residuals at rows `at` (N,), fractional: cubics through the four rows around (Catmull and Rom 1974), since
-    straight lines between rows shake what moves quickly; feet that stand are those of the nearest row. Steps and turns
-    are those from one output frame to the next."""
+    """Resample the residuals at fractional rows.
+
+    Values are cubics through the four rows around (Catmull and Rom 1974), since linear interpolation shakes what moves
+    quickly. Foot contacts are those of the nearest row. Steps and turns are those from one output frame to the next.
+
+    Args:
+        residuals: the motion relative to its own path, T rows.
+        at: (N,) rows, fractional.
+    Returns:
+        The residuals, N rows.
+    """
     count = len(residuals)
     low = np.clip(np.floor(at + 1e-9).astype(int), 0, count - 1)
     share = np.clip(at - low, 0.0, 1.0)
@@ -191,6 +281,7 @@ def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
     if not share.any():
         whole = residuals.rows(low)
         return whole if np.all(np.diff(low) == 1) else _stepped(residuals, whole, at)
+    # Rows low - 1 to low + 2, and their Catmull-Rom weights at x between low and low + 1.
     around = np.clip(low + np.arange(-1, 3)[:, None], 0, count - 1)
     x = share
     weights = 0.5 * np.stack(
@@ -208,6 +299,7 @@ def take_rows(residuals: Residuals, at: np.ndarray) -> Residuals:
 
 
 def _stepped(residuals: Residuals, rows: Residuals, at: np.ndarray) -> Residuals:
+    """Compute steps and turns of rows `at` as differences of the accumulated ones."""
     index = np.arange(len(residuals))
 
     def since(values: np.ndarray) -> np.ndarray:
@@ -217,6 +309,7 @@ def _stepped(residuals: Residuals, rows: Residuals, at: np.ndarray) -> Residuals
 
 
 def _played(count: int, speed: float, delay: float, fps: float) -> np.ndarray:
+    """Build the fractional row of each output frame, with the wait at the start."""
     last = int(np.floor((count - 1) / speed + 1e-6))
     waits = int(round(delay * fps))
     return np.concatenate([np.zeros(waits), np.arange(last + 1) * speed])
@@ -224,8 +317,14 @@ def _played(count: int, speed: float, delay: float, fps: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Ending:
-    """count: frames from the beginning to the end of the path; shown (N,): which of these every output frame is; again
-    (S,): output frames at which the motion begins anew; told: lines for the user."""
+    """What happens at the end of the path.
+
+    Attributes:
+        count: frames from the start to the end of the path.
+        displayed: (N,) which of these frames each output frame displays.
+        restarts: (S,) output frames at which the motion restarts.
+        messages: for the user.
+    """
 
     count: int
     shown: np.ndarray
@@ -234,12 +333,21 @@ class Ending:
 
 
 def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", closed: bool = False) -> Ending:
-    """How a motion ends on a path `length` metres long, when it is at arc (T,) m, never falling, in its frames.
+    """Find how a motion ends on a path.
 
-    end: "stop", or "repeat": motion and path begin again, as often as there are frames, without the wait that a rider
-    begins with. InputError for a path that has no length."""
+    Args:
+        arc: (T,) metres along the path in each frame, never falling.
+        length: metres of the path.
+        fps: frames per second.
+        end: "stop", or "repeat": motion and path restart as often as there are frames, without the initial wait.
+        closed: whether the path has no end.
+    Returns:
+        The frames to display and the messages.
+    Raises:
+        InputError: if the path has no length.
+    """
     if not np.isfinite(length) or length <= SHORTEST:
-        raise InputError("path", "it has no length", "two different points", "draw a longer path")
+        raise InputError("path", "has no length", "at least two different points", "draw a longer path")
     total = len(arc)
     whole = np.arange(total)
     none = np.zeros(0, dtype=int)
@@ -255,12 +363,12 @@ def find_ending(arc: np.ndarray, length: float, fps: float, end: str = "stop", c
     when, left = count / fps, (total - count) / fps
     line = TimedLine(f"the path ends after {when:.1f} s, {left:.1f} s before the motion", (when, when))
     stops = (line,) if left > _UNSEEN else ()
-    brief = ("the path is passed too quickly to begin again",) if end == "repeat" else ()
+    brief = ("the path is too short to restart: a lap takes less than half a second",) if end == "repeat" else ()
     return Ending(count, whole[:count], none, (*stops, *brief, *short))
 
 
 def _begins(arc: np.ndarray) -> int:
-    """The last of the frames that wait at the path's beginning."""
+    """Find the last of the frames that wait at the start of the path."""
     return max(int(np.searchsorted(arc, arc[0] + 1e-12, side="right")) - 1, 0)
 
 
@@ -269,5 +377,5 @@ def _again(first: int, count: int, total: int, fps: float, told: tuple[str, ...]
     shown = np.concatenate([np.arange(count), first + later % (count - first)])
     again = np.arange(count, total, count - first)
     times = "once" if len(again) == 1 else f"{len(again)} times"
-    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion begins again {times}", (count / fps,) * 2)
+    line = TimedLine(f"the path ends after {count / fps:.1f} s; the motion restarts {times}", (count / fps,) * 2)
     return Ending(count, shown, again, (line, *told))

@@ -1,7 +1,8 @@
-"""Path editing: one good clip rides another path (Gleicher 2001, told by Path editing §3), and its feet stay planted.
+"""Path editing: a clip follows another path (Gleicher 2001, as described in Path editing §3), and its feet stay
+planted.
 
-`prepare` finds a motion's own path and what the motion is relative to it, once; `ride` lays that on a new path,
-quickly, as often as the path is dragged.
+`prepare_source` finds a motion's own path and the motion relative to it, once; `edit_path` constructs the motion on a
+new path, fast enough to repeat it while the path is dragged.
 """
 
 from __future__ import annotations
@@ -36,21 +37,26 @@ _DEFAULTS = defaults("path_editing")
 ENDS = setting("path_editing", "end").choice_names
 _SPEED = setting("path_editing", "speed")
 LEANS_FROM = (0.7, 1.5)
-"""m/s below which nobody leans into a bend, and from which on all of it counts: walkers lean too, on a path that is as
-smooth as these."""
+"""Metres per second below which a body does not lean into a bend, and from which on it leans fully: walkers lean too,
+on a path as smooth as these."""
 INTO_SLOPE, MOST_FORWARD, SLOPE_SECONDS = 0.45, 0.2, 0.6
-"""Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some
-3 degrees forward at a rise of 10 %, backward going down); seconds over which a slope is felt."""
+"""Share of a slope by which the trunk leans into it, and radians of that at most (Leroux, Fung and Barbeau 2002: some 3
+degrees forward at a rise of 10 %, backward going down); seconds over which a slope is averaged."""
 OUT_OF_REACH = 0.03
-"""Metres that a foot may be short of its place without being told."""
+"""Metres that a foot may be short of its place without a warning."""
 STILL = 0.05
-"""Metres of path below which a motion stands still."""
+"""Metres of path below which a motion counts as standing still."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RideSettings:
-    """What a user chooses; the settings table says what each means.
-    detours: (arc m, width m, offset m to the left) each."""
+    """Settings of a path edit; the settings table describes each of them.
+
+    Attributes:
+        detours: (arc, width, offset to the left) of each detour, metres.
+    Raises:
+        InputError: if a value is unknown or outside its limits.
+    """
 
     fit: str = _DEFAULTS["fit"]
     degree: int = _DEFAULTS["degree"]
@@ -74,19 +80,28 @@ class RideSettings:
         if self.fit not in path_frame.KINDS:
             raise InputError("path fit", str(self.fit), " or ".join(path_frame.KINDS))
         if not _SPEED.least <= self.speed <= _SPEED.most:
-            raise InputError("speed", f"{self.speed:g} times", f"{_SPEED.least:g} to {_SPEED.most:g}")
+            raise InputError("speed", f"{self.speed:g}", f"a factor from {_SPEED.least:g} to {_SPEED.most:g}")
         if not 0.0 <= self.delay < 86400.0:
-            raise InputError("delay", f"{self.delay:g} s", "0 or more seconds")
+            raise InputError("delay", f"{self.delay:g} s", "0 s or more, less than a day")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RideSource:
-    """A motion relative to its own path: all that does not depend on the new one.
+    """A motion relative to its own path: everything that does not depend on the new one.
 
-    motion; standing (T, 2, 2) bool, left and right, heel and toe; path with seconds as its parameter; arc: its length;
-    moving: its frame at every frame; residuals; frame: the one of FRAMES they are relative to; humanoid: whether it has
-    feet that can be planted; still: whether it goes nowhere; sole: metres that the
-    foremost joint of a flat foot is over the ground; warnings."""
+    Attributes:
+        motion: as recorded.
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe.
+        path: the motion's own path; its parameter is seconds.
+        arc: the arc length of that path.
+        moving: the moving frame in every frame.
+        residuals: the motion in the moving frame.
+        frame: the one of FRAMES that they are relative to.
+        humanoid: whether it has feet that can be planted.
+        still: whether it stays in place.
+        sole: metres from the ground to the foremost joint of a flat foot.
+        warnings: for the user.
+    """
 
     motion: Motion
     standing: np.ndarray
@@ -102,27 +117,39 @@ class RideSource:
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
-        """Where the motion can be repeated, the best first; looked for when it is first asked."""
+        """Where the motion can be repeated, lowest cost first; searched on first use."""
         return find_loops(self.residuals)
 
     @cached_property
     def way(self) -> Way:
-        """The slopes and bends of its own path."""
+        """Slope and curvature of the motion's own path."""
         return path_time.way_of(self.path, self.arc)
 
     @cached_property
     def bends(self) -> np.ndarray:
-        """(T,) 1/m: how much its own path bends over the ground."""
+        """(T,) 1/m, curvature of the motion's own path over the ground."""
         return ground_contact.curvature(self.path, np.arange(len(self.motion)) / self.motion.fps)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Ridden:
-    """A motion on its new path, N frames. frames (N,): of the source, in general fractional; standing (N, 2, 2) bool,
-    carried from there; arc (N,) m, origin (N, 3) m and heading (N,) radians: where the moving frame is; seams (S,):
-    first frames after a jump from a cycle's end to its start, faded over; again (R,): first frames where motion and
-    path begin anew, a cut, at which nobody stands; correction (N, 2) m by which each foot was moved, miss (N, 2) m that
-    it is short of where it should be; laid: root (N, 3) m and local rotations (N, J, 4) before leaning and planting."""
+    """A motion on its new path, N frames.
+
+    Attributes:
+        motion: the edited motion.
+        frames: (N,) source frames, fractional in general.
+        standing: (N, 2, 2) bool, contacts carried from the source.
+        arc: (N,) metres along the new path.
+        origin: (N, 3) metres, the moving frame's origin, world frame.
+        heading: (N,) radians, the moving frame's heading.
+        transitions: (S,) first frames after a jump from a loop's end to its start, blended.
+        correction: (N, 2) metres by which planting moved each foot.
+        miss: (N, 2) metres that each foot is short of its place.
+        constructed: root (N, 3) m and local rotations (N, J, 4) before leaning and planting.
+        source: the motion relative to its own path.
+        warnings: for the user.
+        restarts: (R,) first frames where motion and path restart: cuts, without any contact.
+    """
 
     motion: Motion
     frames: np.ndarray
@@ -145,13 +172,13 @@ class Ridden:
 
     @property
     def once(self) -> Ridden:
-        """The ride until motion and path begin anew: each time they are laid out alike."""
+        """The edited motion up to its first restart: all laps are alike."""
         if not len(self.again):
             return self
         return replace(self.showing(np.arange(self.again[0])), again=np.zeros(0, dtype=int))
 
     def showing(self, which: np.ndarray) -> Ridden:
-        """The frames `which` (N,)."""
+        """Select frames (N,) of the edited motion."""
         rows = ("frames", "standing", "arc", "origin", "heading", "correction", "miss")
         motion, laid = self.motion, tuple(values[which] for values in self.laid)
         motion = replace(motion, root_positions=motion.root_positions[which], rotations=motion.rotations[which])
@@ -160,12 +187,20 @@ class Ridden:
 
 def prepare(motion: Motion, settings: RideSettings, standing: np.ndarray | None = None,
             path: Path | None = None) -> RideSource:
-    """The motion relative to its own path.
+    """Compute a motion relative to its own path.
 
-    standing: (T, 2, 2) bool, by default told from the motion (`contacts.points`). path: its own path, its parameter
-    seconds from the first frame, by default fitted as `settings` say. InputError for less than two frames."""
+    Args:
+        motion: two frames or more.
+        settings: how the path is fitted, and the frame of the residuals.
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None: detected (`contacts.points`).
+        path: its own path, with seconds from the first frame as parameter; None: fitted.
+    Returns:
+        The source for `edit_path`.
+    Raises:
+        InputError: for fewer than two frames.
+    """
     if len(motion) < 2:
-        raise InputError("motion", f"{len(motion)} frame", "two or more frames")
+        raise InputError("motion", f"{len(motion)} frame", "two frames or more")
     humanoid, told = _humanoid(motion)
     if standing is None:
         standing = contacts.points(motion) if humanoid else np.zeros((len(motion), 2, 2), dtype=bool)
@@ -191,15 +226,24 @@ def prepare(motion: Motion, settings: RideSettings, standing: np.ndarray | None 
 
 
 def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain | None = None) -> Ridden:
-    """The motion of `source` on `path`.
+    """Construct the motion of a source on a new path.
 
-    ground: a `motion.path.terrain.Terrain` that the feet are to follow; without it the path's own height, level across
-    it.
-    The motion's own path, ridden without planting and leaning, gives the motion itself. Raises InputError where the
-    path has no length."""
+    On the motion's own path, without planting and leaning, the result is the motion itself.
+
+    Args:
+        source: of `prepare_source`.
+        path: the new path, world frame.
+        settings: timing, feet, detours.
+        ground: a mesh that the feet follow; None: the path's own height, level across it.
+    Returns:
+        The edited motion with its contacts and warnings.
+    Raises:
+        InputError: if the path has no length.
+    """
     path = with_detours(path, settings.detours)
     arc = source.arc if path is source.path else ArcLength(path)
     residuals, seams, timing, end = _timed(source, path, arc, settings)
+    # Timing first, then pose and place in the moving frame, then lean, then feet.
     rows = path_time.take_rows(residuals, timing.at)
     at = _parameters(source, path, arc, timing=timing, rows=rows, settings=settings)
     origin, tangent = path.at(at), path.at(at, 1)
@@ -231,8 +275,9 @@ def ride(source: RideSource, path: Path, settings: RideSettings, ground: Terrain
 
 def _timed(source: RideSource, path: Path, arc: ArcLength,
            settings: RideSettings) -> tuple[Residuals, np.ndarray, Timing, Ending]:
-    """The residuals as they are shown, once through, cut or cycled; the cycles' seams; when each is shown where; and
-    what happens at the path's end."""
+    """Build the timing: the residuals, cut or cycled; their transitions; row and arc length of each frame; the
+    ending.
+    """
     residuals, seams, told = source.residuals, np.zeros(0, dtype=int), ()
     wishes = path_time.Wishes(settings.slopes and settings.plant and source.humanoid, settings.climbs, settings.bends)
     plain = wishes.none or source.still or path is source.path or not settings.by_arc_length
@@ -246,9 +291,9 @@ def _timed(source: RideSource, path: Path, arc: ArcLength,
         around = cycled(residuals, asked, source.loops)
         residuals, seams, told = around.residuals, around.seams, around.told
     elif settings.cycle:
-        told = ("by time the motion fills every path: it is not cycled",)
+        told = ("by time the motion fills the whole path: cycling has no effect",)
     if source.still:
-        told += ("the motion stands still: it is placed at the path's beginning",)
+        told += ("the motion stays in place: it is put at the start of the path",)
     if way is not None:
         own = _own_way(source, residuals)
         timing = path_time.by_way(residuals, own, way, wishes=wishes, speed=settings.speed, delay=settings.delay,
@@ -257,7 +302,7 @@ def _timed(source: RideSource, path: Path, arc: ArcLength,
         timing = path_time.by_arc_length(residuals, settings.speed, settings.delay)
     else:
         timing = path_time.by_time(residuals, path, arc, settings.speed, settings.delay)
-    # a cycle ends with the path: what is a hair longer does not begin anew
+    # A cycled motion ends with the path: where it is slightly longer it does not restart.
     wish = "stop" if len(seams) else settings.end
     end = path_time.find_ending(timing.arc, arc.length, residuals.fps, wish, path.closed or source.still)
     timing = timing.first(end.count)
@@ -266,7 +311,7 @@ def _timed(source: RideSource, path: Path, arc: ArcLength,
 
 
 def _begun_again(ridden: Ridden, end: Ending) -> Ridden:
-    """The ride as often as its end says; whoever is set back does not stand meanwhile."""
+    """Repeat the edited motion as its ending says; around a restart no foot is in contact."""
     shown = ridden.showing(end.shown)
     standing = shown.standing.copy()
     standing[end.again - 1] = standing[end.again] = False
@@ -274,18 +319,18 @@ def _begun_again(ridden: Ridden, end: Ending) -> Ridden:
 
 
 def _own_way(source: RideSource, residuals: Residuals) -> Way:
-    """What the motion's own path is like at every row."""
+    """Sample the profile of the motion's own path at every row."""
     return path_time.way_at(source.way, source.arc.at(residuals.frames / residuals.fps), residuals.step * residuals.fps)
 
 
 def _own_slope(source: RideSource, rows: Residuals) -> np.ndarray:
-    """(N,) radians that the motion's own path rises at every row."""
+    """Compute the slope (N,) radians of the motion's own path at every row."""
     return np.interp(rows.frames, np.arange(len(source.moving.slope)), source.moving.slope)
 
 
 def _parameters(source: RideSource, path: Path, arc: ArcLength, timing: Timing, rows: Residuals,
                 settings: RideSettings) -> np.ndarray:
-    """(N,) parameters of the path; the motion's own path keeps its time, so that nothing is lost there."""
+    """Compute the parameters (N,) of the path; the motion's own path keeps its time exactly."""
     if path is source.path:
         return rows.frames / rows.fps
     if not settings.by_arc_length:
@@ -295,7 +340,7 @@ def _parameters(source: RideSource, path: Path, arc: ArcLength, timing: Timing, 
 
 def _leaned(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing, rotations: np.ndarray,
             seams: np.ndarray) -> np.ndarray:
-    """The body leant into bends, and its trunk into slopes, as far as the motion did not do so on its own path."""
+    """Lean the body into bends, and its trunk into slopes, beyond what the motion did on its own path."""
     fps = rows.fps
     since = np.diff(timing.arc, prepend=timing.arc[:1])
     own_slope = _own_slope(source, rows)
@@ -313,7 +358,7 @@ def _leaned(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Ti
 
 def _strained(source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarray, timing: Timing,
               rows: Residuals) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Frames (N,) bool in which no foot could follow the path, and what is told of them."""
+    """Find the frames (N,) bool in which no foot can follow the path, with messages."""
     if path is source.path or source.still:
         return np.zeros(len(rows), dtype=bool), ()
     own = np.interp(rows.frames, np.arange(len(source.bends)), source.bends)
@@ -323,7 +368,9 @@ def _strained(source: RideSource, path: Path, at: np.ndarray, tangent: np.ndarra
 
 
 def _let_go(held: Planted, root: np.ndarray, rotations: np.ndarray, free: np.ndarray, fps: float) -> Planted:
-    """The planted motion, but where it is `free` (N,) bool as it was laid out: root (N, 3) m, rotations (N, J, 4)."""
+    """Blend the planted motion to the constructed one (root (N, 3) m, rotations (N, J, 4)) where it is `free` (N,)
+    bool.
+    """
     much = ground_contact.share_free(free, fps)[:, None]
     turned = quaternion.slerp(held.rotations, rotations, much)
     miss = np.where(free[:, None], 0.0, held.miss)
@@ -332,8 +379,9 @@ def _let_go(held: Planted, root: np.ndarray, rotations: np.ndarray, free: np.nda
 
 def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Timing,
            free: np.ndarray) -> tuple[Steps | None, tuple[str, ...]]:
-    """How long steps are on the new path, against their own, and what of that legs cannot do; free (N,) bool: where no
-    feet are planted."""
+    """Compute the scale of the steps on the new path, with messages where legs cannot follow; free (N,) bool:
+    unplanted.
+    """
     own = rows.step * np.cos(_own_slope(source, rows))
     times = path_time.stretched(np.diff(timing.arc, prepend=timing.arc[:1]) * np.cos(moving.slope), own, rows.fps)
     if times is None:
@@ -343,25 +391,25 @@ def _steps(source: RideSource, rows: Residuals, moving: MovingFrame, timing: Tim
     for first, end in runs(worst):
         span = first / rows.fps, (end - 1) / rows.fps
         much = times[first:end][np.argmax(np.abs(np.log(np.maximum(times[first:end], 1e-3))))]
-        asks = f"the path asks for steps {much:.1f} times as long as they were; feet slide"
+        asks = f"the path needs steps {much:.1f} times as long as recorded; feet slide"
         told.append(TimedLine(f"{span[0]:.1f} s: {asks}", span))
     return Steps(moving.heading, times), tuple(told)
 
 
 def _out_of_reach(miss: np.ndarray, fps: float) -> list[str]:
-    """One line for all stances that legs do not reach, from their misses (N, 2) m."""
+    """Report all stances that legs do not reach in one message, from their misses (N, 2) m."""
     far = miss.max(axis=1)
     spans = [(first / fps, (end - 1) / fps) for first, end in runs(far > OUT_OF_REACH)]
     if not spans:
         return []
     times = f"{len(spans)} times, first at {spans[0][0]:.1f} s" if len(spans) > 1 else f"at {spans[0][0]:.1f} s"
-    much = f"feet do not reach where they should stand, by up to {100.0 * far.max():.0f} cm"
+    much = f"feet do not reach their contacts, by up to {100.0 * far.max():.0f} cm"
     return [TimedLine(f"{much}: {times}", *spans)]
 
 
 def _ground(path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain | None, moving: MovingFrame,
             timing: Timing, rows: Residuals) -> Ground:
-    """What the feet are to go on."""
+    """Build the ground to plant the feet on."""
     own = moving.origin[:, 2:] + rows.under
     up = quaternion.rotate(quaternion.about_up(moving.heading)[:, None], rows.up)
     if not settings.slopes or (terrain is None and ground_contact.is_level(path, arc) and not rows.under.any()):
@@ -372,17 +420,18 @@ def _ground(path: Path, arc: ArcLength, settings: RideSettings, terrain: Terrain
 
 
 def _beside(ground: Terrain | None, origin: np.ndarray) -> tuple[str, ...]:
-    """A line where the mesh lies nowhere under the path, origin (T, 3) m: it is elsewhere, or in another unit."""
+    """Report if the mesh is nowhere under the path, origin (T, 3) m: it is elsewhere, or in another unit."""
     some = origin[::8]
     if ground is None or np.isfinite(ground.heights(some[:, :2], np.full(len(some), np.inf))[0]).any():
         return ()
-    return ("the ground lies nowhere under the path: the path's own height counts",)
+    return ("the ground is nowhere under the path, so the path's own height is used: check its place and unit",)
 
 
 def _own_ground(motion: Motion, standing: np.ndarray, path: Path, arc: ArcLength, moving: MovingFrame,
                 metres: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Metres (T, 2) from the motion's own path up to the ground under its feet, and its normals (T, 2, 3) in the
-    frame."""
+    """Measure the ground under the feet on the motion's own path: metres (T, 2) above it, and normals (T, 2, 3) in
+    the frame.
+    """
     if ground_contact.is_level(path, arc):
         return _flat(len(motion))
     body = identify(motion.skeleton)
@@ -403,12 +452,12 @@ def _humanoid(motion: Motion) -> tuple[bool, tuple[str, ...]]:
     try:
         identify(motion.skeleton)
     except InputError:
-        return False, ("no legs were found in this skeleton: its feet are not planted and it does not lean",)
+        return False, ("the skeleton has no recognizable legs: feet are not planted, and the body does not lean",)
     return True, ()
 
 
 def _faces(motion: Motion, humanoid: bool) -> float:
-    """Radians: which way the body faces in the mean; for a path that leads nowhere."""
+    """Compute the mean heading of the body in radians, for a path without movement."""
     if not humanoid:
         return 0.0
     turned = facing(motion)
@@ -420,7 +469,7 @@ def _fitted(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Pat
 
 
 def _fitted_any(motion: Motion, standing: np.ndarray, settings: RideSettings) -> Path:
-    """The path of a body without legs: its root's, as high as its lowest joint is in general."""
+    """Fit the path of a body without legs: that of its root, at the usual height of its lowest joint."""
     places, _ = forward_kinematics(motion)
     line = motion.root_positions.copy()
     line[:, 2] = contacts.at_zero(float(np.percentile(places[..., 2].min(axis=1), 2)))

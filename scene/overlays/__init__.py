@@ -1,11 +1,11 @@
-"""What is drawn over the 3D view: where a take is off, where feet stood, where it is cut and why.
+"""Overlays of the 3D view: where a take leaves the track, where feet were in contact, where it is cut and why.
 
-- `settings`  which of it is drawn, per scene
-- `colours`   one table of colours that all eyes tell apart
-- `shapes`    vertex arrays of soles, rails, bars, figures
-- `prepare`   a take as vertex arrays and lines of text; knows neither bpy nor gpu
-- `store`     which takes are prepared: in a thread, once per take, forgotten when no player shows them; where they lie
-- `rides`     paths, trackers, residuals and the original motion of what rides a path
-- `ball_paths` the trajectories of aimed balls and passing scenes, where they are struck and where they bounce
-- `draw`      the handlers of the view: they only look up; the legend
+- `settings`       which overlays are drawn, per scene
+- `colours`        one colour table for every kind of colour vision
+- `shapes`         vertex arrays of soles, rails, bars, figures
+- `prepare`        a take as vertex arrays and lines of text; independent of bpy and gpu
+- `store`          prepares takes in a thread, once each, and drops them when no player shows them; their place
+- `path_overlays`  paths, trackers, residuals and the original motion of edited bodies
+- `ball_paths`     trajectories of aimed balls and passing scenes, with strikes and bounces
+- `draw`           the handlers of the view, which only look up; the legend
 """

@@ -1,8 +1,8 @@
-"""What is drawn of balls, as in Ball handling Fig. 6: all ways that the ball could take in black, the one it takes in
-white, where it is struck, rings where it bounces. Of an aimed ball also how the striking part moves in each frame, in
-light blue with a point where it would strike; of a passing scene the flight of just now, the others thin.
+"""Overlays of balls, as in Ball handling Fig. 6: all candidate trajectories in black, the chosen one in white, where it
+is struck, rings where it bounces.
 
-Every shape hangs on the very shot or rally that it was made of. Knows neither gpu nor how to draw.
+Of an aimed ball also the path of the striking part, in light blue with a point where it would strike; of a passing
+scene the current flight, the others thin. Every shape is cached with its shot or rally. Independent of gpu.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .rides import Item
 if TYPE_CHECKING:
     from ..ball.shots import Solved
 
-MOST = 40  # candidates that are drawn
+MOST = 40  # candidates drawn, at most
 SPEED = 0.04  # metres of a line for each m/s of the striking part
 DOT, RING, CROSS, LIFT = 0.018, 0.14, 0.09, 0.012  # metres
 WIDE, THIN = 3.5, 1.5  # pixels
@@ -32,7 +32,7 @@ STEP = 0.02  # s
 
 
 def items(scene: bpy.types.Scene) -> list[Item]:
-    """All that is to be drawn at the current frame."""
+    """List everything to draw at the current frame."""
     world, shown = Matrix.Scale(units_per_metre(scene), 4), rally_seen(scene)
     found = [Item((solved, "shot"), lambda solved=solved: shot_meshes(solved), world) for solved in shots_seen(scene)]
     if shown is not None:
@@ -43,12 +43,12 @@ def items(scene: bpy.types.Scene) -> list[Item]:
 
 
 def any_seen(scene: bpy.types.Scene) -> bool:
-    """Whether anything of balls is drawn."""
+    """Return whether any ball overlay is drawn."""
     return bool(shots_seen(scene)) or rally_seen(scene) is not None
 
 
 def shots_seen(scene: bpy.types.Scene) -> list["Solved"]:
-    """The shots of which anything is to be drawn."""
+    """List the shots to draw."""
     view = scene.beyond_mocap.view
     if not view.show or not view.shots or not shots.anything():
         return []
@@ -57,13 +57,13 @@ def shots_seen(scene: bpy.types.Scene) -> list["Solved"]:
 
 
 def rally_seen(scene: bpy.types.Scene) -> make.Rally | None:
-    """The rally of which anything is to be drawn."""
+    """Find the rally to draw, or None."""
     view = scene.beyond_mocap.view
     return make.rally_of(scene) if make.has_rallies() and view.show and view.shots else None
 
 
 def shot_meshes(solved: "Solved") -> list[Mesh]:
-    """One shot."""
+    """Build the meshes of one shot."""
     shot, strikes, flight = solved.shot, solved.strikes, solved.flight
     end = flight.rests_from if flight.rests_from is not None else flight.end
     arrives = shot.seconds
@@ -80,7 +80,7 @@ def shot_meshes(solved: "Solved") -> list[Mesh]:
 
 
 def rally_meshes(shown: make.Rally) -> list[Mesh]:
-    """All flights, strikes and bounces of a passing scene."""
+    """Build the meshes of all flights, strikes and bounces of a passing scene."""
     lines = np.concatenate([shapes.along(way) for way in shown.ways])
     found = [repeated_mesh(lines, colours.GREY, THIN, 0.6)]
     if len(shown.strikes):
@@ -90,7 +90,7 @@ def rally_meshes(shown: make.Rally) -> list[Mesh]:
 
 
 def flight_meshes(shown: make.Rally, now: int) -> list[Mesh]:
-    """One flight of a passing scene, and those that its strike could have given."""
+    """Build the meshes of one flight of a passing scene, with the candidates of its strike."""
     found, strike = [], int(np.searchsorted(shown.strike_times, shown.starts[now] + 1e-6)) - 1
     if strike >= 0 and shown.candidates[strike].size:
         found.append(_candidates(shown.candidates[strike]))
@@ -98,12 +98,12 @@ def flight_meshes(shown: make.Rally, now: int) -> list[Mesh]:
 
 
 def _candidates(few: np.ndarray) -> Mesh:
-    """Flights that a strike could have given: (N, P, 3) m."""
+    """Build lines of candidate flights (N, P, 3) m."""
     return segments_mesh(few[:, :-1], few[:, 1:], colours.BLACK, THIN, 0.75)
 
 
 def _bounces(places: np.ndarray) -> list[Mesh]:
-    """Rings on the ground at places (N, 3) m; none where there are none."""
+    """Build rings on the ground at places (N, 3) m."""
     if not len(places):
         return []
     rings = np.concatenate([shapes.circle(place + [0.0, 0.0, LIFT], RING) for place in places]).astype(np.float32)
@@ -116,7 +116,7 @@ def _times(first: float, last: float, bounces: np.ndarray) -> np.ndarray:
 
 
 def _dots(places: np.ndarray, colour) -> Mesh:
-    """Small octahedra."""
+    """Build small octahedra."""
     corners = DOT * np.array([(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)], float)
     faces = [(i, (i + 1) % 4, tip) for tip in (4, 5) for i in range(4)]
     one = corners[np.array(faces)].reshape(-1, 3)

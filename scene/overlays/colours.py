@@ -1,5 +1,6 @@
-"""One table of colours, all of M. Okabe and K. Ito's set (Color Universal Design, 2008), which every kind of colour
-vision tells apart; bad goes from blue over yellow to vermilion, so that it also grows darker and lighter."""
+"""One colour table, all from the set of M. Okabe and K. Ito (Color Universal Design, 2008), distinct for every kind of
+colour vision; scales go from blue over yellow to vermilion, so that they also change in lightness.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ LEFT, RIGHT, MIDDLE = SKY, PURPLE, WHITE
 SEAM, BALL, STRIKE, GAP = WHITE, ORANGE, GREEN, VERMILION
 ASKED, PLAYED = SKY, ORANGE
 SCALE = (BLUE, SKY, YELLOW, ORANGE, VERMILION)
-"""From good to bad; the middle one is where the target ends."""
+"""From good to bad; the middle one is the limit of the target."""
 
 ROOT_STOPS = (0.0, 0.005, 0.015, 0.05, 0.5)
 """Metres of root error at the colours of SCALE: targets of mean and 95 % are the second and third."""
@@ -24,7 +25,15 @@ SLIDE_STOPS = (0.0, 0.005, 0.021, 0.05, 0.1)
 
 
 def scaled(values: np.ndarray, stops: tuple[float, ...], alpha: float = 1.0) -> np.ndarray:
-    """Colours (N, 4) float32 of values (N,) between `stops`; grey where a value is not known."""
+    """Map values to colours between `stops`; NaN is grey.
+
+    Args:
+        values: (N,) values.
+        stops: values at the colours of SCALE.
+        alpha: opacity.
+    Returns:
+        (N, 4) float32.
+    """
     table = np.array(SCALE)
     known = np.isfinite(values)
     at = np.where(known, values, 0.0)
@@ -36,5 +45,5 @@ def scaled(values: np.ndarray, stops: tuple[float, ...], alpha: float = 1.0) -> 
 
 
 def repeated(colour: tuple[float, float, float], count: int, alpha: float = 1.0) -> np.ndarray:
-    """One colour (N, 4) float32 for `count` vertices."""
+    """Repeat one colour for `count` vertices: (N, 4) float32."""
     return np.tile(np.array((*colour, alpha), np.float32), (count, 1))

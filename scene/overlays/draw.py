@@ -1,8 +1,7 @@
-"""The handlers of the 3D view. Nothing is worked out here: batches are made once of what `prepare` made, then drawn,
-and beside them texts and the legend of what is switched on.
+"""The handlers of the 3D view: they draw cached batches of what `prepare` built, with texts and the legend.
 
-Depth is tested against the scene with a small bias towards the eye, since what lies on the ground lies there with the
-pitch's own lines, and far away the depth buffer cannot tell centimetres.
+Depth is tested with a small bias towards the eye, since overlays on the ground coincide with the pitch's lines, and far
+away the depth buffer cannot resolve centimetres.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ MOST_LABELS = 12
 SIZE, MARGIN, LINE = 11, 5, 1.4  # points, points, sizes
 SWATCH = 150  # points: length of a colour scale
 FONT = 0
-GROUND = (0.03, 0.03, 0.03, 0.72)  # what text stands on
+GROUND = (0.03, 0.03, 0.03, 0.72)  # background of texts
 
 _batches: dict[tuple, list] = {}
 _owners: dict[str, Prepared] = {}
@@ -36,7 +35,15 @@ _square: list = []
 
 
 class Shown(NamedTuple):
-    """One player as drawn: name and body, what is prepared, where it lies, its clock."""
+    """One player as drawn.
+
+    Attributes:
+        take: name of the take.
+        prepared: its meshes and texts.
+        world: matrix from the take's metres to the scene.
+        seconds: the present time on the take's clock.
+        active: whether the player is active.
+    """
 
     take: str
     prepared: Prepared
@@ -46,17 +53,17 @@ class Shown(NamedTuple):
 
 
 def free() -> None:
-    """Free what was drawn."""
+    """Free all cached batches."""
     _batches.clear()
     _owners.clear()
     _square.clear()
 
 
 def write_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) -> None:
-    """Lines of text, the first on top, on a dark ground whose lower left corner is at pixel x, y."""
+    """Draw lines of text, the first on top, on a dark background whose lower left corner is at pixel x, y."""
     size, margin, text = SIZE * scale, MARGIN * scale, "\n".join(lines)
     blf.size(FONT, size)
-    blf.enable(FONT, blf.WORD_WRAP)  # breaks at line ends too, so that one call draws all lines
+    blf.enable(FONT, blf.WORD_WRAP)  # also breaks at line ends, so that one call draws all lines
     blf.word_wrap(FONT, 10000)
     width, height = blf.dimensions(FONT, text)
     draw_box(x, y, width + 2 * margin, height + 2.4 * margin, (*GROUND[:3], GROUND[3] * strength))
@@ -67,7 +74,7 @@ def write_lines(x: float, y: float, lines, scale: float, strength: float = 1.0) 
 
 
 def draw_box(x: float, y: float, width: float, height: float, colour) -> None:
-    """A filled rectangle in pixels."""
+    """Draw a filled rectangle in pixels."""
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     if not _square:
         _square.append(batch_for_shader(shader, "TRIS", {"pos": [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]}))
@@ -80,7 +87,7 @@ def draw_box(x: float, y: float, width: float, height: float, colour) -> None:
 
 
 def draw_legend(context, on: list[str]) -> None:
-    """The legend in the view's lower left corner, a row for each overlay that needs one."""
+    """Draw the legend in the lower left corner of the view, with a row for each overlay that needs one."""
     rows = [row for name, row in ROWS.items() if name in on]
     if not rows:
         return
@@ -92,7 +99,7 @@ def draw_legend(context, on: list[str]) -> None:
 
 
 def _shown(context) -> list[Shown]:
-    """What there is to draw in this view; [] where overlays are switched off or nothing is prepared."""
+    """List the takes to draw in this view; [] if overlays are off or nothing is prepared."""
     settings = getattr(context.scene, "beyond_mocap", None)
     space = context.space_data
     if settings is None or not settings.view.on() or not space.overlay.show_overlays:
@@ -109,7 +116,7 @@ def _shown(context) -> list[Shown]:
 
 
 def _forget(now: dict[str, Prepared]) -> None:
-    """Free the batches of takes that are drawn no more."""
+    """Free the batches of takes that are no longer drawn."""
     gone = {take for take, owner in _owners.items() if store.prepared(take) is not owner}
     for key in [key for key in _batches if key[0] in gone]:
         del _batches[key]
@@ -119,7 +126,7 @@ def _forget(now: dict[str, Prepared]) -> None:
 
 
 def _riding(context) -> list[rides.Item]:
-    """What there is to draw of riders and balls in this view; the batches of what is drawn no more are freed."""
+    """List the path and ball overlays of this view, and free the batches of those no longer drawn."""
     items = []
     if context.space_data.overlay.show_overlays and getattr(context.scene, "beyond_mocap", None) is not None:
         items = [*rides.items(context.scene), *ball_paths.items(context.scene)]
@@ -130,6 +137,7 @@ def _riding(context) -> list[rides.Item]:
 
 
 def _draw_shapes():
+    """Draw all shapes of the view: overlays of takes, then those of paths and balls."""
     context = bpy.context
     found, riding = _shown(context), _riding(context)
     if not found and not riding:
@@ -169,7 +177,7 @@ def _draw_overlay(context, view, name: str, shown: Shown) -> None:
 
 
 def _ghost_frames(view, shown: Shown) -> list[int]:
-    """Frames of the figures near the playhead; the one at the playhead is the body itself."""
+    """List the frames of the figures near the playhead, without that of the body itself."""
     prepared = shown.prepared
     first, now, last = (prepared.frame(shown.seconds + side * view.reach) for side in (-1, 0, 1))
     if view.ghosts_at == "SEAMS":
@@ -184,7 +192,7 @@ def _figure(prepared: Prepared, frame: int) -> Mesh:
 
 
 def _made(key: tuple, meshes) -> list:
-    """The batches of one overlay, made when it is first drawn."""
+    """Build the batches of one overlay when it is first drawn."""
     if key not in _batches:
         _batches[key] = [
             (batch_for_shader(_shader(mesh.kind), mesh.kind, {"pos": mesh.points, "color": mesh.colours}), mesh)
@@ -208,7 +216,7 @@ def _draw_batches(context, batches) -> None:
 
 
 def _draw_contacts(shown: Shown) -> None:
-    """A disc under each foot that stands now."""
+    """Draw a disc under each foot in contact."""
     prepared, frame = shown.prepared, shown.prepared.frame(shown.seconds)
     shader = gpu.shader.from_builtin("UNIFORM_COLOR")
     for side, rgb in enumerate((colours.LEFT, colours.RIGHT)):
@@ -227,6 +235,7 @@ def _disc() -> list[Mesh]:
 
 
 def _draw_texts():
+    """Draw all texts of the view and the legend."""
     context = bpy.context
     found, over = _shown(context), context.space_data.overlay.show_overlays
     riding, shot = over and rides.seen(context.scene), over and ball_paths.any_seen(context.scene)
@@ -253,7 +262,7 @@ def _near_labels(context, view, shown: Shown) -> None:
 
 
 def _why(context, view, shown: Shown) -> None:
-    """Clip names at the cuts around the playhead, and beside the active body why its clip is played."""
+    """Draw clip names at the cuts around the playhead, and the reasons for the active body's clip beside it."""
     prepared, now = shown.prepared, shown.prepared.piece(shown.seconds)
     near = [p for p in prepared.pieces if p is not now and abs(p.start - shown.seconds) <= view.reach]
     for piece in near[:MOST_LABELS]:
@@ -265,8 +274,7 @@ def _why(context, view, shown: Shown) -> None:
 
 
 def _text(context, where: Vector, lines, strength: float, shift: tuple[float, float]) -> None:
-    """Lines on a dark ground with their lower left corner `shift` points from a place in the world; nothing where it is
-    behind the eye or outside."""
+    """Draw lines `shift` points from a place in the world; nothing if it is behind the eye or outside the view."""
     region = context.region
     at = location_3d_to_region_2d(region, context.region_data, where)
     if at is None or not (-50 < at.x < region.width + 50 and -50 < at.y < region.height + 50):
@@ -276,9 +284,10 @@ def _text(context, where: Vector, lines, strength: float, shift: tuple[float, fl
 
 
 def _scale(title: str, stops, factor: float, unit: str):
-    """A row that shows a colour scale with its numbers."""
+    """Build a legend row with a colour scale and its numbers."""
 
     def row(x: float, y: float, scale: float) -> float:
+        """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         step, width = LINE * size, SWATCH * scale
         height = 2 * step + 0.6 * size + 2 * margin
@@ -297,9 +306,10 @@ def _scale(title: str, stops, factor: float, unit: str):
 
 
 def _keys(*entries: tuple[str, tuple]):
-    """A row of coloured squares with words."""
+    """Build a legend row of coloured squares with labels."""
 
     def row(x: float, y: float, scale: float) -> float:
+        """Draw the row at pixel x, y; returns its height."""
         size, margin = SIZE * scale, MARGIN * scale
         blf.size(FONT, size)
         widths = [blf.dimensions(FONT, text)[0] + 2.4 * size for text, _ in entries]
@@ -325,12 +335,12 @@ def _write_line(x: float, y: float, text: str, size: float) -> None:
 WATCHER = Watcher(name="Drawing of overlays", ends=free, draws=((bpy.types.SpaceView3D, _draw_shapes, "POST_VIEW"),
                                                                 (bpy.types.SpaceView3D, _draw_texts, "POST_PIXEL")))
 ROWS = {
-    "track": _scale("Off the track", colours.ROOT_STOPS, 100.0, "cm"),
-    "footprints": _scale("Standing foot slides", colours.SLIDE_STOPS, 1000.0, "mm"),
-    "speed": _keys(("asked speed", colours.ASKED), ("the body's", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
+    "track": _scale("Distance to track", colours.ROOT_STOPS, 100.0, "cm"),
+    "footprints": _scale("Foot slide", colours.SLIDE_STOPS, 1000.0, "mm"),
+    "speed": _keys(("track speed", colours.ASKED), ("body speed", colours.PLAYED), ("1 m high: 5 m/s", colours.GREY)),
     "contacts": _keys(("left", colours.LEFT), ("right", colours.RIGHT)),
-    "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("a tick: 1 s", colours.GREY)),
-    "shots": _keys(("the ball's way", colours.WHITE), ("other ways", colours.BLACK),
+    "rides": _keys(("original", colours.SKY), ("new path", colours.ORANGE), ("tick: 1 s", colours.GREY)),
+    "shots": _keys(("ball trajectory", colours.WHITE), ("other candidates", colours.BLACK),
                    ("after the target", colours.VERMILION), ("striking part", colours.SKY),
                    ("strike", colours.STRIKE), ("bounce", colours.ORANGE)),
     "moments": _keys(("strike point", colours.STRIKE), ("ball", colours.BALL), ("gap", colours.GAP)),

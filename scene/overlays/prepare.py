@@ -1,4 +1,4 @@
-"""A take as vertex arrays and lines of text, all worked out before anything is drawn. Metres, the track's clock."""
+"""A take as vertex arrays and lines of text, computed before anything is drawn. Metres, the track's clock."""
 
 from __future__ import annotations
 
@@ -9,23 +9,30 @@ import numpy as np
 
 from . import colours, shapes
 
-if TYPE_CHECKING:  # the core's modules are slow to import, and switching the extension on has to be quick
+if TYPE_CHECKING:  # the core's modules are slow to import, and enabling the extension must be quick
     from ...beyond_mocap.evaluation.per_frame import Footprint, PerFrame, Strike
     from ...beyond_mocap.library.library import Library
     from ...beyond_mocap.synthesis.plan import Plan
     from ...beyond_mocap.synthesis.search.why import Reason
     from ...beyond_mocap.synthesis.take import Take
 
-RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each over the last
+RAIL, SOLE, SOLE_EDGE, SEAM = 0.020, 0.024, 0.027, 0.030  # metres above the ground, each above the one before
 RAILS, HALF_SEAM = (0.13, 0.17), 0.35
-SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's foot, and of its height for each m/s
+SPEED_FOOT, PER_SPEED = 0.05, 0.2  # metres of the speed curtain's lower edge, and of its height for each m/s
 BALL_SECONDS = 1.0
 MOST_PARTS = 4
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """kind: "TRIS" or "LINES". points (N, 3) float32 m, colours (N, 4) float32. width: of lines, in pixels."""
+    """Triangles or lines to draw.
+
+    Attributes:
+        kind: "TRIS" or "LINES".
+        points: (N, 3) float32 metres.
+        colours: (N, 4) float32.
+        width: of lines, in pixels.
+    """
 
     kind: str
     points: np.ndarray
@@ -34,25 +41,32 @@ class Mesh:
 
 
 def line_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
-    """A broken line through points (T, 3) m."""
+    """Build a polyline through points (T, 3) m."""
     return repeated_mesh(shapes.along(points), colour, width, alpha)
 
 
 def segments_mesh(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
-    """Lines from start to end, both (..., 3) m."""
+    """Build lines from start to end, both (..., 3) m."""
     points = np.stack([start, end], axis=-2).reshape(-1, 3).astype(np.float32)
     return repeated_mesh(points, colour, width, alpha)
 
 
 def repeated_mesh(points: np.ndarray, colour, width: float, alpha: float = 1.0) -> Mesh:
-    """Lines of one colour between pairs of points (2 N, 3) m."""
+    """Build lines of one colour between pairs of points (2 N, 3) m."""
     return Mesh("LINES", points, colours.repeated(colour, len(points), alpha), width)
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One uncut piece: start, end s; place (3,) m of its seam on the ground; name: of the clip, short; lines: why it
-    was chosen."""
+    """One uncut piece of a take.
+
+    Attributes:
+        start: seconds.
+        end: seconds.
+        place: (3,) metres, its transition on the ground.
+        name: of the clip, short.
+        lines: why it was chosen.
+    """
 
     start: float
     end: float
@@ -63,7 +77,13 @@ class Piece:
 
 @dataclass(frozen=True)
 class Label:
-    """Text at a place (3,) m; it is about `time` s."""
+    """Text at a place.
+
+    Attributes:
+        time: seconds that it is about.
+        place: (3,) metres.
+        text: one line.
+    """
 
     time: float
     place: tuple[float, float, float]
@@ -72,11 +92,23 @@ class Label:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """All that is shown of one take.
+    """Everything to draw of one take.
 
-    start: the first second; fps: frames per second; count: frames. meshes: overlay -> its meshes. pelvis (T, 3) m; toes
-    (T, 2, 3) m and stands (T, 2) of left and right foot; figures (T, J, 3) m, pairs (B, 2) and pair_colours (2 B, 4) of
-    stick figures. seams: frames. pieces, labels: in the order of time."""
+    Attributes:
+        start: its first second.
+        fps: frames per second.
+        count: frames.
+        meshes: overlay -> its meshes.
+        pelvis: (T, 3) metres.
+        toes: (T, 2, 3) metres, left and right.
+        contacts: (T, 2) bool, contact of left and right foot.
+        figures: (T, J, 3) metres of the joints.
+        pairs: (B, 2) joints of the lines of stick figures.
+        pair_colours: (2 B, 4) of these lines.
+        transitions: frames.
+        pieces: by time.
+        labels: by time.
+    """
 
     start: float
     fps: float
@@ -93,16 +125,24 @@ class Prepared:
     labels: tuple[Label, ...]
 
     def frame(self, seconds: float) -> int:
-        """The output frame nearest to a second; the first or last beyond the ends."""
+        """Find the output frame nearest to a second, within the take."""
         return min(max(round((seconds - self.start) * self.fps), 0), self.count - 1)
 
     def piece(self, seconds: float) -> Piece | None:
-        """The piece that is played at a second."""
+        """Find the piece that is played at a second."""
         return next((p for p in self.pieces if p.start <= seconds < p.end), None)
 
 
 def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
-    """Everything about one take. library: what it was made from; None: nothing is compared with its recordings."""
+    """Build everything to draw of one take.
+
+    Args:
+        plan: its plan.
+        take: the take.
+        library: of its clips; None: no comparison with recordings.
+    Returns:
+        Meshes and texts.
+    """
     from ...beyond_mocap.evaluation.per_frame import footprints, per_frame, strikes
     from ...beyond_mocap.evaluation.reference import View
     from ...beyond_mocap.synthesis.quality.played import played_from_take
@@ -128,7 +168,7 @@ def prepare(plan: "Plan", take: "Take", library: "Library | None") -> Prepared:
 
 
 def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
-    """Rails along the measured track, coloured by root error; between them stay the footprints."""
+    """Build rails along the measured track, coloured by root error, with footprints visible in between."""
     if len(figures.times) < 2 or not np.isfinite(figures.track).all():
         return ()
     points, owner = shapes.rails(figures.track, *RAILS, RAIL)
@@ -136,7 +176,7 @@ def _track(figures: "PerFrame") -> tuple[Mesh, ...]:
 
 
 def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
-    """Soles coloured by slide, their edges by side."""
+    """Build soles coloured by slide, with edges coloured by side."""
     if not found:
         return ()
     side = np.array([p.side for p in found])
@@ -150,7 +190,7 @@ def _footprints(found: tuple["Footprint", ...]) -> tuple[Mesh, ...]:
 
 
 def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
-    """A bar across the way at every seam, light on dark."""
+    """Build a bar across the path at every transition, light on dark."""
     if not len(seams):
         return ()
     points = shapes.bars(pelvis, np.asarray(seams, int), HALF_SEAM, SEAM)
@@ -158,7 +198,7 @@ def _seams(pelvis: np.ndarray, seams: np.ndarray) -> tuple[Mesh, ...]:
 
 
 def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
-    """Strike points, the ball then and its way about them, and the gap between the two."""
+    """Build strike points, the ball and its trajectory around them, and the gap between both."""
     from ...beyond_mocap.motion.track import BALL_RADIUS
 
     lines: list[tuple[np.ndarray, tuple]] = []
@@ -178,7 +218,7 @@ def _moments(found: tuple["Strike", ...], take: "Take") -> tuple[Mesh, ...]:
 
 
 def _speed(path: np.ndarray, figures: "PerFrame") -> tuple[Mesh, ...]:
-    """The asked speed as a curtain over the track, the body's own as a line."""
+    """Build the track's speed as a curtain, and the body's as a line."""
     if len(path) < 2 or not np.isfinite(figures.asked_speed).all() or not np.isfinite(path).all():
         return ()
     asked, played = (SPEED_FOOT + PER_SPEED * values for values in (figures.asked_speed, figures.speed))
@@ -203,7 +243,7 @@ def _label(strike: "Strike") -> Label:
 
 
 def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.ndarray) -> tuple[Piece, ...]:
-    """The pieces, with the reasons of the search where its library is known."""
+    """Build the pieces, with the reasons of the search if the library is known."""
     last = len(pelvis) - 1
     return tuple(Piece(take.start_time + start, take.start_time + end,
                        (*map(float, pelvis[min(int(round(start * take.motion.fps)), last)]), SEAM), name, lines)
@@ -211,7 +251,7 @@ def _pieces(plan: "Plan", take: "Take", library: "Library | None", pelvis: np.nd
 
 
 def _told(plan: "Plan", take: "Take", library: "Library | None"):
-    """start, end (seconds from the take's first), name and lines of every piece."""
+    """Iterate over start and end (seconds from the take's first), name and lines of every piece."""
     if library is None or take.edit is None:
         edges = [0, *map(int, take.seams), len(take.clip)]
         for low, high in zip(edges, edges[1:]):
@@ -233,7 +273,14 @@ def _reasons(plan: "Plan", take: "Take", library: "Library") -> list["Reason"]:
 
 
 def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
-    """Why a piece was chosen, in a few lines."""
+    """Describe why a piece was chosen.
+
+    Args:
+        reason: of the search.
+        name: of the clip.
+    Returns:
+        Lines: name, frames, costs, the next candidates.
+    """
     from ...beyond_mocap.synthesis.search.path_costs import TERMS
 
     lines = [name, f"frames {reason.shown[0]:.0f} to {reason.shown[1]:.0f}, played at {reason.rate:.2f} x"]
@@ -244,12 +291,12 @@ def reason_lines(reason: "Reason", name: str) -> tuple[str, ...]:
     dear = sorted((p for p in both.items() if abs(p[1]) >= 0.005), key=lambda part: -abs(part[1]))[:MOST_PARTS]
     lines += [f"{value:.2f}  {TERMS[part]}" for part, value in dear]
     if reason.others:
-        lines.append("next at its start:")
+        lines.append("next candidates:")
         lines += [f"{other.more:+.2f}  {short(other.path, other.mirrored)}" for other in reason.others]
     return tuple(lines)
 
 
 def short(path: str, mirrored: bool) -> str:
-    """A clip's name for people: without folder's length and ending, with a word for its mirroring."""
+    """Shorten a clip's path to its name, with a note if it is mirrored."""
     name = path.rpartition("/")[2].removesuffix(".bvh")
     return f"{name} (mirrored)" if mirrored else name

@@ -1,7 +1,7 @@
-"""What is drawn of riders: their own path and the new one, where they are on both, the original motion beside.
+"""Overlays of path editing: the original and the new path, the place on both, and the original motion.
 
-Every shape hangs on the very motion or source that it was made of, so that one that is dragged is made anew only when
-it has been laid anew. Knows neither gpu nor how to draw.
+Every shape is cached with its motion or source, so that it is rebuilt only when that was recomputed. Independent of
+gpu.
 """
 
 from __future__ import annotations
@@ -30,8 +30,13 @@ ORIGINAL, NEW = colours.SKY, colours.ORANGE
 
 
 class Item(NamedTuple):
-    """One thing to draw. key: the same as long as it looks the same; meshes: makes it, in metres; world: where it
-    goes."""
+    """One thing to draw.
+
+    Attributes:
+        key: stays the same while its look does.
+        meshes: builds its meshes, in metres.
+        world: matrix to the scene.
+    """
 
     key: tuple
     meshes: Callable[[], list[Mesh]]
@@ -39,7 +44,7 @@ class Item(NamedTuple):
 
 
 def items(scene: bpy.types.Scene) -> list[Item]:
-    """All that is to be drawn of the riders that are seen, at the current frame."""
+    """List everything to draw of visible edited bodies at the current frame."""
     found = seen(scene)
     if not found:
         return []
@@ -48,7 +53,7 @@ def items(scene: bpy.types.Scene) -> list[Item]:
 
 
 def seen(scene: bpy.types.Scene) -> list[riders.Shown]:
-    """The riders of which anything is to be drawn."""
+    """List the edited bodies to draw."""
     if not riders.anybody_shown() or not scene.beyond_mocap.view.on_path():
         return []
     found = [riders.shown(body) for body in riding(scene) if body.visible_get()]
@@ -56,8 +61,9 @@ def seen(scene: bpy.types.Scene) -> list[riders.Shown]:
 
 
 def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> list[Item]:
+    """Build the items of one edited body for the switched-on overlays."""
     source, ridden, found = shown.source, shown.ridden, []
-    row, was = shown.frames(frame)  # of the ridden motion, and of the original
+    row, was = shown.frames(frame)  # rows of the edited motion and of the original
     if "path_source" in on:
         found.append(Item((source, "path"), lambda: source_path(source, shown.source_line), world))
     if "path_new" in on:
@@ -80,30 +86,30 @@ def _items(on: list[str], shown: riders.Shown, frame: float, world: Matrix) -> l
 
 
 def source_path(source: "RideSource", line: np.ndarray) -> list[Mesh]:
-    """The original motion's own path, line (N, 3) m, with a tick every second."""
+    """Build the original path, line (N, 3) m, with a tick every second."""
     return [_line(line, ORIGINAL, WIDE, 0.9),
             _ticks(source.moving.origin, source.moving.heading, source.motion.fps, ORIGINAL)]
 
 
 def new_path(ridden: "Ridden", line: np.ndarray) -> list[Mesh]:
-    """The new path, line (N, 3) m, thin, the part that is ridden wide, with a tick every second."""
+    """Build the new path, line (N, 3) m, thin; the part that the motion covers wide; with a tick every second."""
     return [_line(line, NEW, THIN, 0.6), *_ridden(ridden),
             _ticks(ridden.origin, ridden.heading, ridden.motion.fps, NEW)]
 
 
 def residuals(motion, origin: np.ndarray, colour) -> list[Mesh]:
-    """Faint lines from the path up to the pelvis, some in every second."""
+    """Build faint lines from the path up to the pelvis, several in every second."""
     step = max(1, round(EVERY * motion.fps))
     return [_strokes(origin[::step], motion.root_positions[: len(origin) : step], colour, THIN, 0.4)]
 
 
 def residual(motion, origin: np.ndarray, row: int, colour) -> list[Mesh]:
-    """The same at one frame, strong."""
+    """Build the strong line from the path to the pelvis at one frame."""
     return [_strokes(origin[row : row + 1], motion.root_positions[row : row + 1], colour, WIDE, 1.0)]
 
 
 def figure(source: "RideSource", row: int) -> list[Mesh]:
-    """The original motion at one frame, as a stick figure."""
+    """Build the original motion at one frame as a stick figure."""
     from ...beyond_mocap.motion.motion import pose_kinematics
 
     motion = source.motion
@@ -113,7 +119,7 @@ def figure(source: "RideSource", row: int) -> list[Mesh]:
 
 
 def tracker(colour) -> list[Mesh]:
-    """A ring with an arrow along X."""
+    """Build a ring with an arrow along X."""
     tip, back = ARROW, ARROW - 0.14
     arrow = [(RING, 0.0, LIFT), (tip, 0.0, LIFT), (tip, 0.0, LIFT), (back, 0.08, LIFT), (tip, 0.0, LIFT),
              (back, -0.08, LIFT)]
@@ -122,7 +128,7 @@ def tracker(colour) -> list[Mesh]:
 
 
 def _ridden(ridden: "Ridden") -> list[Mesh]:
-    """The way of the tracker, piece by piece where it starts again."""
+    """Build the path of the tracker, split where it restarts."""
     step = np.linalg.norm(np.diff(ridden.origin, axis=0), axis=1)
     starts = np.flatnonzero(step > 0.5) + 1
     return [_line(piece, NEW, WIDE, 0.9) for piece in np.split(ridden.origin, starts) if len(piece) > 1]
@@ -137,7 +143,7 @@ def _strokes(start: np.ndarray, end: np.ndarray, colour, width: float, alpha: fl
 
 
 def _ticks(origin: np.ndarray, heading: np.ndarray, fps: float, colour) -> Mesh:
-    """A short bar across the path at every whole second."""
+    """Build a short bar across the path at every whole second."""
     rows = np.round(np.arange(0.0, len(origin), fps)).astype(int)
     rows = rows[rows < len(origin)]
     aside = HALF_TICK * np.stack([-np.sin(heading[rows]), np.cos(heading[rows]), np.zeros(len(rows))], axis=1)

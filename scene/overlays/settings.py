@@ -1,4 +1,4 @@
-"""What is drawn over the 3D view, per scene."""
+"""Which overlays are drawn over the 3D view, per scene."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ OVERLAYS = ("track", "footprints", "contacts", "seams", "moments", "speed", "gho
 """The overlays, in the order in which they are drawn and listed."""
 
 PATH_OVERLAYS = ("path_source", "path_new", "path_trackers", "path_residuals", "path_ghost")
-"""The overlays about riders, likewise; they are about every armature that rides a path."""
+"""The overlays of path editing, likewise; they show every armature that follows a path."""
 
 
 def _changed(_settings, context):
-    """Let what is missing be prepared and the views be drawn again."""
+    """Prepare what is missing and redraw the views."""
     if context.scene is not None and not bpy.app.background:
         store.sync(context.scene)
         window.redraw()
@@ -28,16 +28,16 @@ class BeyondMocapView(bpy.types.PropertyGroup):
     """The overlays' switches."""
 
     def on(self) -> list[str]:
-        """The names of the overlays that are to be drawn."""
+        """List the names of the overlays to draw."""
         return [name for name in OVERLAYS if getattr(self, name)] if self.show else []
 
     def on_path(self) -> list[str]:
-        """The names of the overlays about riders that are to be drawn."""
+        """List the names of the path overlays to draw."""
         return [name for name in PATH_OVERLAYS if getattr(self, name)] if self.show else []
 
 
 class BeyondMocapPlayhead(bpy.types.PropertyGroup):
-    """What there is to tell about the current frame; on the window manager, so that undo leaves it alone."""
+    """Texts about the current frame; on the window manager, so that undo leaves them alone."""
 
     attached_to = ("WindowManager.beyond_mocap_playhead",)
-    why: StringProperty(description="Lines on why the clip at the playhead is played")
+    why: StringProperty(description="Reasons for the clip at the playhead, line by line")

@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import numpy as np
 
-SOLE = np.array([  # a left shoe's outline, 1 long, heel at x = 0, toes at x = 1, the body's middle at -y
+SOLE = np.array([  # outline of a left shoe, length 1, heel at x = 0, toes at x = 1, the body's middle at -y
     (0.02, 0.00), (0.05, 0.10), (0.17, 0.15), (0.32, 0.14), (0.48, 0.15), (0.65, 0.19), (0.80, 0.18), (0.92, 0.11),
     (0.99, -0.01), (0.98, -0.11), (0.90, -0.17), (0.76, -0.18), (0.60, -0.14), (0.44, -0.10), (0.28, -0.11),
     (0.13, -0.13), (0.04, -0.10),
 ])  # fmt: skip
-HEEL_SHARE = 0.2  # of a shoe's length that lies behind the ankle
-LENGTHS = (0.22, 0.32)  # metres, least and most of a shoe
-USUAL = 0.28
-CIRCLE = 24
+HEEL_SHARE = 0.2  # share of a shoe's length behind the ankle
+LENGTHS = (0.22, 0.32)  # metres, limits of a shoe's length
+USUAL = 0.28  # metres of a shoe without toe joints
+CIRCLE = 24  # segments
 
 
 def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.ndarray, height: float):
-    """Shoe soles of N stances as triangles (N * K * 3, 3) and as outlines, lines (N * K * 2, 3), with K corners each.
+    """Build shoe soles of N stances with K corners each.
 
-    heel, toe (N, 2) m of the joints; direction (N,) radians; side (N,) 0 left, 1 right; height m above the ground."""
+    Args:
+        heel: (N, 2) metres of the heel joints.
+        toe: (N, 2) metres of the toe joints.
+        direction: (N,) radians.
+        side: (N,) 0 left, 1 right.
+        height: metres above the ground.
+    Returns:
+        Triangles (N * K * 3, 3), and outlines as lines (N * K * 2, 3).
+    """
     span = np.linalg.norm(toe - heel, axis=1)
     jointed = span > 0.02
     length = np.where(jointed, np.clip(1.9 * span, *LENGTHS), USUAL)
@@ -34,8 +42,16 @@ def soles(heel: np.ndarray, toe: np.ndarray, direction: np.ndarray, side: np.nda
 
 
 def rails(path: np.ndarray, inner: float, outer: float, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two bands along path (T, 2) m, from `inner` to `outer` m to either side, as triangles (12 (T - 1), 3), and which
-    point of the path each corner belongs to."""
+    """Build two bands along a path.
+
+    Args:
+        path: (T, 2) metres.
+        inner: metres from the path to the bands.
+        outer: metres from the path to their outer edges.
+        height: metres above the ground.
+    Returns:
+        Triangles (12 (T - 1), 3), and the path point of each corner.
+    """
     aside = across(path)
     bands = [_band(path + sign * inner * aside, path + sign * outer * aside, height) for sign in (1.0, -1.0)]
     return tuple(np.concatenate(parts) for parts in zip(*bands))
@@ -49,7 +65,7 @@ def _band(left: np.ndarray, right: np.ndarray, height: float) -> tuple[np.ndarra
 
 
 def curtain(path: np.ndarray, top: np.ndarray, foot: float) -> np.ndarray:
-    """An upright band along path (T, 2) m from `foot` up to top (T,) m as triangles (6 (T - 1), 3)."""
+    """Build an upright band along path (T, 2) m from height `foot` to top (T,) m: triangles (6 (T - 1), 3)."""
     low = on_ground(path, foot)
     high = np.concatenate([path, top[:, None]], axis=1).astype(np.float32)
     a, b = slice(None, -1), slice(1, None)
@@ -57,18 +73,18 @@ def curtain(path: np.ndarray, top: np.ndarray, foot: float) -> np.ndarray:
 
 
 def along(points: np.ndarray) -> np.ndarray:
-    """A broken line through points (T, 3) m as lines (2 (T - 1), 3)."""
+    """Build lines (2 (T - 1), 3) through points (T, 3) m."""
     return np.stack([points[:-1], points[1:]], axis=1).reshape(-1, 3).astype(np.float32)
 
 
 def bars(path: np.ndarray, at: np.ndarray, half_width: float, height: float) -> np.ndarray:
-    """Bars square across path (T, 2) m at its points `at` (S,), as lines (2 S, 3)."""
+    """Build bars across path (T, 2) m at its points `at` (S,): lines (2 S, 3)."""
     aside = across(path)[at] * half_width
     return on_ground(np.stack([path[at] - aside, path[at] + aside], axis=1).reshape(-1, 2), height)
 
 
 def circle(centre, radius: float, up: bool = False) -> np.ndarray:
-    """A circle about centre (3,) m, flat or upright in two planes, as lines (n, 3)."""
+    """Build a circle about centre (3,) m, flat, or also upright in two planes: lines (n, 3)."""
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE + 1)
     c, s, zero = radius * np.cos(angle), radius * np.sin(angle), np.zeros(CIRCLE + 1)
     rings = [np.stack(parts, axis=1) for parts in ((c, s, zero), (c, zero, s), (zero, c, s))]
@@ -76,25 +92,25 @@ def circle(centre, radius: float, up: bool = False) -> np.ndarray:
 
 
 def disc(radius: float) -> np.ndarray:
-    """A flat disc about the origin as triangles (3 CIRCLE, 3)."""
+    """Build a flat disc about the origin: triangles (3 CIRCLE, 3)."""
     angle = np.linspace(0.0, 2.0 * np.pi, CIRCLE + 1)
     rim = np.stack([radius * np.cos(angle), radius * np.sin(angle), 0.0 * angle], axis=1)
     return np.stack([0.0 * rim[:-1], rim[:-1], rim[1:]], axis=1).reshape(-1, 3).astype(np.float32)
 
 
 def cross(centre, size: float) -> np.ndarray:
-    """A three-dimensional cross as lines (6, 3)."""
+    """Build a three-dimensional cross: lines (6, 3)."""
     arms = np.eye(3).repeat(2, axis=0) * np.tile([size, -size], 3)[:, None]
     return (arms + centre).astype(np.float32)
 
 
 def figure_pairs(parents) -> np.ndarray:
-    """(B, 2) joints that a stick figure's lines join; the root's own line is left out."""
+    """List the joints (B, 2) that the lines of a stick figure join, without the root's own line."""
     return np.array([(parent, joint) for joint, parent in enumerate(parents) if parent >= 0])
 
 
 def across(path: np.ndarray) -> np.ndarray:
-    """Unit vectors (T, 2) to the left of a path (T, 2); where it stands still, of the way before."""
+    """Compute unit vectors (T, 2) to the left of a path (T, 2); where it stays in place, those of the frame before."""
     step = np.gradient(path, axis=0) if len(path) > 1 else np.ones((1, 2))
     length = np.linalg.norm(step, axis=1)
     moving = length > 1e-4
@@ -107,5 +123,5 @@ def across(path: np.ndarray) -> np.ndarray:
 
 
 def on_ground(points: np.ndarray, height: float) -> np.ndarray:
-    """Points (N, 2) m at one height: (N, 3) float32."""
+    """Build points (N, 3) float32 from points (N, 2) m at one height."""
     return np.concatenate([points, np.full((len(points), 1), height)], axis=1).astype(np.float32)

@@ -1,7 +1,7 @@
-"""Which takes are prepared for drawing: once each, in a thread, forgotten when no player shows them any more.
+"""The takes that are prepared for drawing: once each, in a thread, and dropped when no player shows them.
 
-`sync` is cheap and called whenever the file has changed: it compares a few names. What is missing is prepared in the
-background while nothing else is made, and the views are drawn again once it is there.
+`update_store` is cheap and called whenever the file has changed: it compares a few names. Missing takes are prepared in
+the background while no other work runs, and the views are redrawn when they are ready.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from .prepare import Prepared
 
 KIND = "view"
-WAIT = 0.1  # seconds between two looks at the thread
+WAIT = 0.1  # seconds between two checks of the thread
 
 _prepared: dict[str, "Prepared"] = {}
 _refused: set[str] = set()
@@ -29,12 +29,12 @@ _running: list[tuple[background.Job, str]] = []  # at most one, with the name of
 
 
 def prepared(take: str) -> "Prepared | None":
-    """What is drawn of the take of that name; None while it is not prepared."""
+    """Find the prepared take of that name; None while it is not ready."""
     return _prepared.get(take)
 
 
 def shown_players(settings) -> list:
-    """The players that the overlays are about."""
+    """List the players whose overlays are drawn."""
     if settings.view.players == "TICKED":
         return [player for player in settings.players if player.use and player.take]
     player = active_row(settings.players, settings.active_player)
@@ -42,7 +42,7 @@ def shown_players(settings) -> list:
 
 
 def sync(scene: bpy.types.Scene) -> None:
-    """Forget what no player shows, and begin to prepare what is missing."""
+    """Drop takes that no player shows, and start to prepare missing ones."""
     settings = getattr(scene, "beyond_mocap", None)
     if settings is None:
         return
@@ -55,7 +55,7 @@ def sync(scene: bpy.types.Scene) -> None:
 
 
 def clear() -> None:
-    """Forget everything, and stop what runs."""
+    """Drop all takes and stop the thread."""
     background.stop(KIND)
     _running.clear()
     _prepared.clear()
@@ -63,7 +63,7 @@ def clear() -> None:
 
 
 def tell_why(scene: bpy.types.Scene) -> None:
-    """Put the text about the piece at the playhead where the panel finds it."""
+    """Store the text about the piece at the playhead for the panel."""
     manager, settings = bpy.context.window_manager, scene.beyond_mocap
     player = active_row(settings.players, settings.active_player)
     found = prepared(player.take) if player is not None and player.take else None
@@ -74,14 +74,17 @@ def tell_why(scene: bpy.types.Scene) -> None:
 
 
 def seconds_at(scene: bpy.types.Scene, frame: float | None = None) -> float:
-    """What the tracking file's clock shows at a scene frame, or now."""
+    """Compute the time of the tracking file's clock at a scene frame, or now."""
     settings = scene.beyond_mocap
     frame = scene.frame_current_final if frame is None else frame
     return settings.start_time + (frame - settings.start_frame) / frames_per_second(scene)
 
 
 def take_to_world(scene: bpy.types.Scene, body: bpy.types.Object | None) -> Matrix:
-    """From a take's metres to the scene's units: where the body was, and with it where the user has moved it since."""
+    """Compute the matrix from a take's metres to the scene's units.
+
+    It includes the place of the body when the take was written, and where the user has moved it since.
+    """
     scale = Matrix.Scale(units_per_metre(scene), 4)
     written = _written(body) if body is not None else None
     return scale if written is None else body.matrix_world @ written.inverted_safe() @ scale
@@ -99,7 +102,7 @@ def _frame_changed(scene) -> None:
 
 
 def _missing(scene: bpy.types.Scene) -> list[tuple]:
-    """(name, plan, take, library) of takes that are to be shown and not prepared."""
+    """List (name, plan, take, library) of takes to show that are not prepared."""
     settings = scene.beyond_mocap
     players = [*shown_players(settings), *filter(None, [active_row(settings.players, settings.active_player)])]
     names = dict.fromkeys(player.take for player in players if player.take)
@@ -124,13 +127,13 @@ def _work(orders, _progress, cancelled, _hurry) -> dict[str, "Prepared"]:
 
 
 def _poll() -> float | None:
-    """One look: start the thread, wait for it, or take what it brings."""
+    """Check once: start the thread, wait for it, or store its result."""
     scene = bpy.context.scene
     if not _running:
         orders = _missing(scene)[:1]
         if not orders:
             return None
-        if bpy.context.window_manager.beyond_mocap_work.kind:  # something is being made: it comes first
+        if bpy.context.window_manager.beyond_mocap_work.kind:  # running work comes first
             return 5 * WAIT
         _running.append((background.Job(KIND, lambda *asking: _work(orders, *asking)), orders[0][0]))
         return WAIT
@@ -141,14 +144,14 @@ def _poll() -> float | None:
     _prepared.update(job.result or {})
     if job.error is not None:
         _refused.add(name)
-        print(f"Beyond Mocap: nothing can be drawn of {name}: {job.error}")
+        print(f"Beyond Mocap: cannot draw the overlays of {name}: {job.error}")
     tell_why(scene)
     window.redraw()
     return WAIT
 
 
 def _written(body: bpy.types.Object) -> Matrix | None:
-    """The armature's matrix when its take was written."""
+    """Read the armature's matrix when its take was written; None without one."""
     for action in _actions(body):
         if (numbers := action.get(PLACED)) is not None:
             rows = list(numbers)
@@ -157,7 +160,7 @@ def _written(body: bpy.types.Object) -> Matrix | None:
 
 
 def _actions(body: bpy.types.Object):
-    """The actions that an object plays: its own, and those of its strips."""
+    """Iterate over the actions that an object plays: its own, and those of its strips."""
     data = body.animation_data
     if data is not None:
         yield from filter(None, [data.action])

@@ -1,12 +1,11 @@
-"""Path editing: armatures whose motion rides a curve, and follows it while it is edited.
+"""Path editing: armatures whose motion follows a curve while the curve is edited.
 
-- `settings`   what a rider keeps, and which riders a button means
-- `curve`      what a rider follows: the curve object, read as a path of the core and made of one; the ground
-- `carrier`    how an armature's motion is read and written, the original kept while a path is dragged; `keys` in place,
-               channel by channel
-- `rigs`       carriers of rigs of any kind: looked at once (`rig_look`, `rig_source`), their body found (`rig_parts`),
-               their controls carried (`rig_ride`) by what `..rigs.control_study` finds
-- `riders`     a ride begun, brought up to date, kept or ended
-- `live`       sees that something has been edited, and brings riders up to date; their figures once they are at rest
-- `keep_apart` finds who would run into whom, or into a bystander, and asks riders to wait or go round
+- `settings`             the stored state of a path edit, and the armatures that a button acts on
+- `curve`                the new path: a curve object, read as a path of the core or created from one; the ground
+- `armature_adapter`     reads an armature's motion and writes the edited one; `keys` in place, channel by channel
+- `rigs`                 adapters of rigs of any kind: sampled once (`rig_sampling`, `rig_source`), their body
+                         identified (`rig_parts`), their controls solved (`rig_transfer`) with `..rigs.control_study`
+- `edited_bodies`        starts, updates, applies and reverts path edits
+- `live`                 detects edits and updates the motion; measures it once the curve is at rest
+- `collision_avoidance`  finds collisions of edited bodies and other bodies, and adds waits and detours
 """

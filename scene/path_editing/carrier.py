@@ -1,7 +1,7 @@
-"""What carries a motion: how an armature's motion is read, and how the ridden one is written onto it. The original,
-relative to its own path, is worked out once and kept as long as nothing of it changes.
+"""Adapters: how an armature's motion is read, and how the edited motion is written to it.
 
-`PlainCarrier` knows armatures whose bones are keyed themselves. Other kinds are in `rigs`, where `carrier_of` chooses.
+The original, relative to its own path, is computed once and cached while its inputs stay the same. `PlainAdapter` is
+for armatures whose bones are keyed directly. Other kinds are in `rigs`, where `choose_adapter` decides.
 """
 
 from __future__ import annotations
@@ -22,19 +22,25 @@ from ..core.set_aside import bring_back, put_aside
 from ..rigs import armature
 from . import keys
 
-MARK = "beyond_mocap_ride"  # custom property of an action that a rider plays: a digest of what it was made of
-MADE_OF = ("fit", "degree", "frame")  # settings that the original's own path and the offsets from it depend on
+MARK = "beyond_mocap_ride"  # custom property of an edited body's action: a digest of its inputs
+MADE_OF = ("fit", "degree", "frame")  # settings on which the original's own path and the offsets from it depend
 
 _sources: dict[int, Source] = {}  # by session_uid of the armature
 # likewise: the original action and its keys' digest, until they may have changed
 _keys: dict[int, tuple[int, bytes]] = {}
-_refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of what could not be read, and why
+_refused: dict[int, tuple[bytes, str]] = {}  # likewise: digest of inputs that could not be read, and the error
 
 
 @dataclass(frozen=True, eq=False)
 class Read:
-    """A motion in metres of the scene's world at the scene's rate, its first frame on scene frame `first`; standing
-    (T, 2, 2) bool, left and right, heel and toe, where it is known; told: lines for the user."""
+    """A motion in metres of the scene's world at the scene's rate.
+
+    Attributes:
+        motion: the original motion.
+        first: scene frame of its first frame.
+        standing: (T, 2, 2) bool, contact of left and right, heel and toe; None where unknown.
+        messages: lines for the user.
+    """
 
     motion: Motion
     first: int
@@ -43,7 +49,7 @@ class Read:
 
 
 def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object]:
-    """Action and slot of an armature's own motion: of a rider those put aside, else those that are played."""
+    """Find action and slot of an armature's own motion: the stored ones of an edited body, else those that play."""
     if not body.beyond_mocap_ride.on:
         return channels.playing(body)
     before = body.beyond_mocap_ride.before
@@ -54,75 +60,79 @@ def original_of(body: bpy.types.Object) -> tuple[bpy.types.Action | None, object
 
 
 def no_motion(body: bpy.types.Object) -> InputError:
-    """The error of an armature that plays nothing."""
-    return InputError(f"armature {body.name}", "it plays no action", "a motion", "import one, or choose an action")
+    """Build the error for an armature that plays nothing."""
+    return InputError(f"armature {body.name}", "plays no action", "a motion", "import one, or choose an action")
 
 
 def check_finite(body: bpy.types.Object, motion: Motion) -> None:
-    """InputError where an armature's motion has a pose that is no number."""
+    """Raise InputError if an armature's motion has NaN or infinite values."""
     if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
-        raise InputError(f"armature {body.name}", "a pose that is no number", "numbers", "look at its keys")
+        raise InputError(f"armature {body.name}", "a pose with NaN or infinite values", "finite values",
+                         "check its keys")
 
 
 def refuse_system_override(body: bpy.types.Object, what: str = "armature") -> None:
-    """InputError where an object is a library override that cannot be edited."""
+    """Raise InputError if an object is a library override that cannot be edited."""
     if body.override_library is not None and body.override_library.is_system_override:
-        raise InputError(f"{what} {body.name}", "an override that cannot be edited", "an editable override",
+        raise InputError(f"{what} {body.name}", "is an override that cannot be edited", "an editable override",
                          "make it editable: Outliner, Library Override, Make")
 
 
 class Carrier(ABC):
-    """One armature for the length of one event; nothing of Blender's is kept in it longer than that."""
+    """Reads and writes the motion of one armature during one event; it keeps no Blender data longer than that."""
 
     def __init__(self, body: bpy.types.Object):
         self.body = body
 
     @property
     def ride(self):
-        """What the armature keeps of its ride."""
+        """The stored state of the armature's path edit."""
         return self.body.beyond_mocap_ride
 
     def source(self) -> tuple[bpy.types.Action | None, object]:
-        """Action and slot of the original motion."""
+        """Find action and slot of the original motion."""
         return original_of(self.body)
 
     def check(self) -> None:
-        """InputError where the armature cannot ride."""
+        """Raise InputError if the armature cannot follow a path."""
         body = self.body
         channels.check_local(body)
         refuse_system_override(body)
         if body.mode == "EDIT":
-            raise InputError(f"armature {body.name}", "its bones are being edited", "object or pose mode",
+            raise InputError(f"armature {body.name}", "is in edit mode", "object or pose mode",
                              "leave edit mode (Tab)")
         channels.check_free(body)
 
     @abstractmethod
     def stamp(self, scene: bpy.types.Scene) -> bytes:
-        """Quick: another where `read` would read something else though no key of the original is another."""
+        """Compute a fast digest of all inputs of `read_motion` except the original's keys."""
 
     @abstractmethod
     def read(self, scene: bpy.types.Scene) -> Read:
-        """The original motion. InputError where there is none."""
+        """Read the original motion. Raises InputError if there is none."""
 
     @abstractmethod
     def begin(self) -> None:
-        """Put the original aside and play an action of ours, which carries MARK."""
+        """Store the original and play an action of ours, with MARK."""
 
     @abstractmethod
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
-        """Bring the ridden motion into our action and note the digest in MARK. All is worked out before anything is
-        written; InputError, and nothing changed, where it cannot be written."""
+        """Write the edited motion to our action and its digest to MARK.
+
+        Everything is computed before anything is written. Raises InputError, and changes nothing, if it cannot be
+        written.
+        """
 
     def end(self) -> None:
-        """Play the original again, to the last bit, and stand as before."""
+        """Play the original again, bit for bit, in its previous state."""
         bring_back(self.ride.before, self.body, MARK)
 
     @abstractmethod
     def settle(self) -> None:
-        """Our action is to stay: it needs nothing of ours any more."""
+        """Make our action independent of the path edit, for it is to stay."""
 
     def keys_digest(self) -> bytes:
-        """Another where a key of the original is another."""
+        """Compute a digest of the original's keys."""
         found, slot = self.source()
         if found is None or slot is None:
             return b""
@@ -132,12 +142,15 @@ class Carrier(ABC):
         return byte_digest(*parts)
 
     def ours(self) -> tuple[bpy.types.Action, object]:
-        """Our action and its slot; a copy where another object plays it too: a duplicate of a rider is a rider of its
-        own. InputError where the armature plays another."""
+        """Find our action and its slot, as a copy if another object plays it too: a duplicated body has its own path
+        edit.
+
+        Raises InputError if the armature plays another action.
+        """
         found, slot = channels.playing(self.body)
         if found is None or not found.get(MARK):
-            raise InputError(f"armature {self.body.name}", "it plays another action than that of its ride",
-                             "that action", "choose it again in the Action Editor, or press Leave")
+            raise InputError(f"armature {self.body.name}", "plays another action than that of its path edit",
+                             "that action", "choose it again in the Action Editor, or press Revert")
         channels.check_local(found)
         if found.users - found.use_fake_user < 2:
             return found, slot
@@ -169,10 +182,12 @@ class PlainCarrier(Carrier):
         return byte_digest(np.array(body.matrix_world), rest, form)
 
     def read(self, scene: bpy.types.Scene) -> Read:
+        """Read the motion of the bones' channels."""
         found, slot = self._original()
         motion = action.read(self.body, scene, found, slot)
         if not (np.isfinite(motion.root_positions).all() and np.isfinite(motion.rotations).all()):
-            raise InputError(f"action {found.name}", "a key that is no number", "numbers", "delete that key")
+            raise InputError(f"action {found.name}", "a key with NaN or infinite values", "finite values",
+                             "delete that key")
         ends = channels.keyed_range({
             key: curve for key, curve in channels.curves(found, slot).items() if key[0].startswith("pose.bones")
         })
@@ -188,6 +203,7 @@ class PlainCarrier(Carrier):
         channels.assign(self.body, made, next(slot for slot in made.slots if slot.identifier == identifier))
 
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+        """Write the changed channels, and the original ones resampled where other source frames are displayed."""
         made, slot = self.ours()
         sheet = keys.Sheet.of(made, slot, *self.source())
         wanted = self._wanted(scene, read, ridden, sheet)
@@ -196,7 +212,8 @@ class PlainCarrier(Carrier):
             others = [place for place in sheet.sources if place not in wanted]
             wanted |= keys.sampled(sheet, others, read.first + whole, read.first + ridden.frames)
         if not all(np.isfinite(values).all() for values in wanted.values()):
-            raise InputError("motion on the path", "a pose that is no number", "numbers", "take back the last edit")
+            raise InputError("motion on the path", "a pose with NaN or infinite values", "finite values",
+                             "undo the last edit")
         keys.lay(sheet, read.first, wanted, str(made[MARK]), digest)
         made[action.PLACED] = [number for row in self.body.matrix_world for number in row]
         made[MARK] = digest
@@ -206,7 +223,7 @@ class PlainCarrier(Carrier):
             keys.settle(keys.Sheet.of(*self.ours(), *self.source()))
 
     def _wanted(self, scene: bpy.types.Scene, read: Read, ridden, sheet: keys.Sheet) -> dict[keys.Place, np.ndarray]:
-        """Values (N,) of the bones' channels that are others than in the original."""
+        """Compute the values (N,) of the bones' channels that differ from the original."""
         body, motion, names = self.body, ridden.motion, ridden.motion.skeleton.names
         bones = [body.pose.bones[name] for name in names]
         changed = _changed(read.motion, motion)
@@ -228,7 +245,13 @@ class PlainCarrier(Carrier):
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """read: the original motion; core: it relative to its own path; digest: of what both were made of."""
+    """An original motion, relative to its own path.
+
+    Attributes:
+        read: the original motion.
+        core: `PathEditSource` of the core.
+        digest: of all inputs.
+    """
 
     read: Read
     core: object
@@ -236,19 +259,29 @@ class Source:
 
 
 def forget_sources() -> None:
-    """Nothing is remembered any more: another file is open."""
+    """Clear all caches when another file is opened."""
     _sources.clear()
     recheck_sources()
 
 
 def recheck_sources() -> None:
-    """Keys of any original may be others: they are looked at again, those too that could not be read."""
+    """Mark the keys of all originals as possibly changed, also of those that could not be read."""
     _keys.clear()
     _refused.clear()
 
 
 def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
-    """An armature's original motion for these settings of the core. InputError where there is none."""
+    """Read an armature's original motion for these settings of the core, from the cache if its inputs are the same.
+
+    Args:
+        carrier: adapter of the armature.
+        scene: for rate and unit.
+        settings: `PathEditSettings` of the core.
+    Returns:
+        The motion relative to its own path.
+    Raises:
+        InputError: if there is no motion.
+    """
     from ...beyond_mocap.path_editing.ride import prepare
 
     uid, wishes = carrier.body.session_uid, tuple(getattr(settings, name) for name in MADE_OF)
@@ -266,7 +299,7 @@ def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
     try:
         read = carrier.read(scene)
         found = Source(read, prepare(read.motion, settings, read.standing), digest)
-    except BeyondMocapError as error:  # to look at a rig is a change of frame: it would be looked at again and again
+    except BeyondMocapError as error:  # sampling a rig changes the frame, which would trigger it again and again
         _refused[uid] = digest, str(error)
         raise
     _sources[uid] = found
@@ -274,13 +307,13 @@ def read_source(carrier: Carrier, scene: bpy.types.Scene, settings) -> Source:
 
 
 def _path(bone: bpy.types.PoseBone, what: str) -> str:
-    """The data path of a bone's location, or of its rotation in a mode."""
+    """Build the data path of a bone's location, or of its rotation in a mode."""
     name = {"location": "location", "QUATERNION": "rotation_quaternion", "AXIS_ANGLE": "rotation_axis_angle"}
     return f'pose.bones["{bpy.utils.escape_identifier(bone.name)}"].{name.get(what, "rotation_euler")}'
 
 
 def _changed(before: Motion, after: Motion) -> np.ndarray:
-    """(J,) bool: which joints turn otherwise than before; all where the motions are not of one length."""
+    """Compare two motions: (J,) bool, joints whose rotations differ; all if the motions differ in length."""
     if len(before) != len(after):
         return np.ones(len(after.skeleton), dtype=bool)
     return (np.abs(np.sum(before.rotations * after.rotations, axis=2)) < 1.0 - 1e-11).any(axis=0)

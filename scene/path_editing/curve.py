@@ -1,5 +1,6 @@
-"""What a rider follows: the new path as an ordinary curve object, read as it lies in the world, also while it is being
-edited, and made; and the ground that its feet follow."""
+"""The new path as an ordinary curve object: read in world space, also while it is edited, and created; and the
+ground.
+"""
 
 from __future__ import annotations
 
@@ -19,24 +20,34 @@ from ..player.drawn_track import points_of
 KINDS = (("BEZIER", "Bezier", "Points on the path, with handles"),
          ("NURBS", "NURBS", "Control points beside the path: a B-spline, smoother, with fewer points"))
 SHAPES = (("FITTED", "Original", "Along the original path"),
-          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward where that ends"),
-          ("PRESENT", "As It Is", "Along the new path as it is, with other points"))
-MARK = "beyond_mocap_path"  # on curve objects that were made here
-_STEP, _PIECES = 0.04, (8, 600)  # metres between places on a Bezier segment; how many there are of them
+          ("STRAIGHT", "Straight", "A straight line, as long as the original path, toward its end"),
+          ("PRESENT", "As It Is", "Along the current path, with other points"))
+MARK = "beyond_mocap_path"  # on curve objects that the extension created
+_STEP, _PIECES = 0.04, (8, 600)  # metres between samples of a Bezier segment; limits of their number
 _NURBS_PIECES = 48
 _COUNTS = (6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40, 48, 60, 80)
-_CLOSE = 0.03  # metres from the path that a fitted curve may be
-_APART = 5.0  # metres that points are apart at most, so that there is always one to pull
-_NEAREST, _MOST = 0.08, 240  # metres that Bezier points are apart at least, and how many there are at most
+_CLOSE = 0.03  # metres between a fitted curve and the path, at most
+_APART = 5.0  # metres between two points, at most, so that there is always one to drag
+_NEAREST, _MOST = 0.08, 240  # metres between two Bezier points, at least; number of points, at most
 _SPARE = 0.002  # metres by which a fitted curve is longer than the path, so that the motion does not end early
 _grounds: dict[int, tuple[bytes, object]] = {}  # by session_uid of the mesh object: digest, `Terrain`
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A curve object as it is now. points: (P, 9) m of Bezier points and their left and right handles, or (P, 4) of
-    other control points and their weights, in the world; still: bytes that are others only where it is edited, not
-    where it is animated; notes: lines for the user."""
+    """A curve object as it is now.
+
+    Attributes:
+        name: of the object.
+        kind: BEZIER, NURBS or POLY.
+        points: (P, 9) metres, Bezier points with their left and right handles, or (P, 4) other control points with
+            their weights, world frame.
+        order: of a NURBS curve.
+        clamped: whether a NURBS curve reaches its end points.
+        closed: whether its end is its start.
+        still: bytes that change with edits only, not with animation.
+        notes: messages for the user.
+    """
 
     name: str
     kind: str
@@ -49,11 +60,11 @@ class Drawn:
 
     @property
     def digest(self) -> bytes:
-        """Another where the path is another."""
+        """A digest that changes with the path."""
         return byte_digest(f"{self.kind} {self.order} {self.clamped} {self.closed}", self.still)
 
     def line(self) -> np.ndarray:
-        """Places (N, 3) m along it, close together where it bends."""
+        """Sample the curve: places (N, 3) m, dense where it bends."""
         from ...beyond_mocap.motion.track.drawn import nurbs_line
 
         points = self.points
@@ -62,13 +73,13 @@ class Drawn:
         if self.kind == "POLY":
             return points[:, :3]
         degree = min(self.order, len(points)) - 1
-        if self.closed:  # the first points once more, so that it goes round evenly
+        if self.closed:  # repeat the first points, so that the curve closes smoothly
             points = np.concatenate([points, points[:degree]])
         weights = np.maximum(points[:, 3], 1e-6)
         return nurbs_line(points[:, :3], weights, degree + 1, self.clamped and not self.closed, _NURBS_PIECES)[0]
 
     def path(self) -> Path:
-        """As a path of the core. InputError where it leads nowhere."""
+        """Convert the curve to a path of the core. Raises InputError if it has no length."""
         from ...beyond_mocap.path_editing.path_line import through
 
         line = self.line()
@@ -78,31 +89,32 @@ class Drawn:
 
 
 def read(scene: bpy.types.Scene, drawn: bpy.types.Object | None) -> Drawn:
-    """A curve object as it is drawn now. InputError where it has no line."""
+    """Read a curve object as it is drawn now. Raises InputError if it has no line."""
     if drawn is None or drawn.name not in scene.objects:
-        raise InputError("new path", "its curve is gone from the scene", "a curve object",
-                         "choose another, or make a New Curve")
+        raise InputError("new path", "its curve is not in the scene", "a curve object",
+                         "choose another curve, or press New Curve")
     if drawn.type != "CURVE":
-        raise InputError(f"object {drawn.name}", "no curve", "a curve object (Add > Curve)", "choose another")
+        raise InputError(f"object {drawn.name}", "is not a curve", "a curve object (Add > Curve)", "choose another")
     lines = [spline for spline in drawn.data.splines if len(points_of(spline)) > 1]
     if not lines:
-        raise InputError(f"curve {drawn.name}", "no line", "two points or more", "add points in edit mode")
+        raise InputError(f"curve {drawn.name}", "has no line", "two points or more", "add points in edit mode")
     spline, notes = lines[0], []
     if len(lines) > 1:
-        notes.append(f"curve {drawn.name}: only the first of its {len(lines)} lines is the path")
+        notes.append(f"curve {drawn.name}: only the first of its {len(lines)} splines is the path")
     if any(modifier.show_viewport for modifier in drawn.modifiers):
-        notes.append(f"curve {drawn.name}: its modifiers are not followed")
+        notes.append(f"curve {drawn.name}: its modifiers are ignored")
     if drawn.data.shape_keys is not None:
-        notes.append(f"curve {drawn.name}: its shape keys are not followed")
+        notes.append(f"curve {drawn.name}: its shape keys are ignored")
     if animated := is_animated(drawn):
-        notes.append(f"curve {drawn.name}: it moves; the motion rides it as it lay when it was edited last")
+        notes.append(f"curve {drawn.name}: its animation is ignored; the motion follows its state at the last edit")
     world, units = np.array(drawn.matrix_world), units_per_metre(scene)
     points = _control_points(spline)
     places = points[:, :9] if spline.type == "BEZIER" else points[:, :3]
     turned = (places.reshape(-1, 3) @ world[:3, :3].T + world[:3, 3]) / units
     values = np.concatenate([turned.reshape(len(points), -1), points[:, places.shape[1]:]], axis=1)
     if not np.isfinite(values).all():
-        raise InputError(f"curve {drawn.name}", "a point that is no number", "numbers", "move or delete that point")
+        raise InputError(f"curve {drawn.name}", "a point with NaN or infinite values", "finite coordinates",
+                         "move or delete that point")
     kind = spline.type if spline.type in {"BEZIER", "POLY"} else "NURBS"
     order = spline.order_u if kind == "NURBS" else 0
     still = points.tobytes() + repr(units).encode() if animated else values.tobytes()
@@ -114,10 +126,21 @@ def create(
     context: bpy.types.Context, name: str, path: Path, straight: bool = False, count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
 ) -> bpy.types.Object:
-    """A curve object along a path, or a straight line as long, from its beginning toward its end.
+    """Create a curve object along a path, or a straight line of the same length, from its start toward its end.
 
-    count: control points; 0 takes as many as it needs to be within 3 cm. kind: BEZIER or NURBS; degree: of the NURBS.
-    InputError where there are too few points for the degree."""
+    Args:
+        context: for scene and collection.
+        name: of the object.
+        path: world frame, metres.
+        straight: a straight line.
+        count: control points; 0 takes as many as it needs to be within 3 cm.
+        kind: BEZIER or NURBS.
+        degree: of a NURBS curve.
+    Returns:
+        The object.
+    Raises:
+        InputError: for too few points for the degree.
+    """
     points, handles = _fitted(path, count, kind, degree, straight)
     units = units_per_metre(context.scene)
     origin = points[0] * units
@@ -148,7 +171,7 @@ def create(
 
 
 def remove_curve(drawn: bpy.types.Object) -> None:
-    """Take a curve object out of the file, and its curve with it where no other object has that."""
+    """Remove a curve object from the file, with its curve data if no other object uses it."""
     data = drawn.data
     bpy.data.objects.remove(drawn)
     if not data.users:
@@ -156,7 +179,9 @@ def remove_curve(drawn: bpy.types.Object) -> None:
 
 
 def is_animated(drawn: bpy.types.Object) -> bool:
-    """Whether an object, a curve or the ground, goes elsewhere with the frame, by itself or with what it hangs on."""
+    """Return whether an object moves with the frame, by its own animation or that of its parents and constraint
+    targets.
+    """
     known, waiting = set(), [drawn]
     while waiting:
         thing = waiting.pop()
@@ -171,16 +196,18 @@ def is_animated(drawn: bpy.types.Object) -> bool:
 
 
 def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> bytes:
-    """Another where the ground's mesh, as it is shown, is another; not where its object is animated: it counts where it
-    lay when something was edited. InputError where it was deleted."""
+    """Compute a digest of the ground's evaluated mesh; the place of an animated ground is ignored.
+
+    Raises InputError if the ground was deleted.
+    """
     if ground is None:
         return b""
     if ground.name not in scene.objects:
-        raise InputError("ground", f"{ground.name} is gone from the scene", "a mesh object", "choose another, or none")
+        raise InputError("ground", f"{ground.name} is not in the scene", "a mesh object", "choose another, or none")
     shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = shown.to_mesh()  # also while it is being edited
     parts = [_vertices(mesh)]
-    if corners := mesh.attributes.get(".corner_vert"):  # at once; triangles take Blender ten times as long
+    if corners := mesh.attributes.get(".corner_vert"):  # ten times as fast as Blender's triangles
         found = np.empty(len(corners.data), np.int32)
         corners.data.foreach_get("value", found)
         parts += [found, len(mesh.polygons).to_bytes(8, "little")]
@@ -191,14 +218,24 @@ def ground_digest(scene: bpy.types.Scene, ground: bpy.types.Object | None) -> by
 
 
 def ground_notes(ground: bpy.types.Object | None) -> tuple[str, ...]:
-    """Lines for the user."""
+    """List messages about the ground."""
     moves = ground is not None and is_animated(ground)
-    return (f"ground {ground.name}: it moves; feet follow it as it lay when it was chosen or edited last",
+    return (f"ground {ground.name}: its animation is ignored; feet follow its state at the last edit",
             ) if moves else ()
 
 
 def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: bytes):
-    """The `Terrain` of a mesh object in metres; None without one. digest: of `ground_digest`."""
+    """Load the `Terrain` of a mesh object in metres; None without one.
+
+    Args:
+        scene: for the unit.
+        ground: a mesh object, or None.
+        digest: of `compute_ground_digest`.
+    Returns:
+        The terrain, cached by digest.
+    Raises:
+        InputError: for a mesh without faces.
+    """
     from ...beyond_mocap.motion.path.terrain import Terrain
 
     if ground is None:
@@ -208,18 +245,18 @@ def ground_of(scene: bpy.types.Scene, ground: bpy.types.Object | None, digest: b
     if _grounds.get(ground.session_uid, (b"", None))[0] != digest:
         places, corners = _mesh(ground)
         if not len(corners):
-            raise InputError(f"ground {ground.name}", "a mesh without faces", "a surface", "choose another")
+            raise InputError(f"ground {ground.name}", "a mesh without faces", "a mesh with faces", "choose another")
         _grounds[ground.session_uid] = digest, Terrain(places / units, corners)
     return _grounds[ground.session_uid][1]
 
 
 def forget_grounds() -> None:
-    """Nothing is remembered any more: another file is open."""
+    """Clear the cache when another file is opened."""
     _grounds.clear()
 
 
 def _control_points(spline: bpy.types.Spline) -> np.ndarray:
-    """(P, 9) or (P, 4): see `Drawn`, in the curve's own space."""
+    """Read control points (P, 9) or (P, 4), see `DrawnCurve`, in the curve's own space."""
     points = points_of(spline)
     names = (("co", 3), ("handle_left", 3), ("handle_right", 3)) if spline.type == "BEZIER" else (("co", 4),)
     columns = []
@@ -231,7 +268,7 @@ def _control_points(spline: bpy.types.Spline) -> np.ndarray:
 
 
 def _bezier(points: np.ndarray) -> np.ndarray:
-    """Places (N, 3) along Bezier points (P, 9)."""
+    """Sample places (N, 3) along Bezier points (P, 9)."""
     a, b, c, d = points[:-1, :3], points[:-1, 6:9], points[1:, 3:6], points[1:, :3]
     length = sum(np.linalg.norm(end - start, axis=1) for start, end in ((a, b), (b, c), (c, d)))
     pieces = np.clip(np.ceil(length / _STEP).astype(int), *_PIECES)
@@ -245,7 +282,7 @@ def _bezier(points: np.ndarray) -> np.ndarray:
 
 
 def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> tuple[np.ndarray, tuple]:
-    """Control points (P, 3) in metres, and for Bezier points their left and right handles."""
+    """Fit control points (P, 3) in metres and, for Bezier points, their left and right handles."""
     from ...beyond_mocap.path_editing import path_line
 
     degree = 3 if kind == "BEZIER" else degree
@@ -269,8 +306,11 @@ def _fitted(path: Path, count: int, kind: str, degree: int, straight: bool) -> t
 
 
 def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
-    """Bezier points (P, 3) on the path and their left and right handles, closer together where it bends, so that they
-    are within _CLOSE of it. Corners that were cut would make the motion run ahead of itself from there on."""
+    """Fit Bezier points (P, 3) on the path and their left and right handles, denser in bends, within _FIT_TOLERANCE of
+    it.
+
+    Corners that were cut would make the motion run ahead of the path from there on.
+    """
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
     arc = ArcLength(path)
@@ -292,14 +332,14 @@ def _chain(path: Path) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
 
 
 def _nodes(path: Path, arc, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
+    """Compute places (N, 3) and unit tangents (N, 3) at arc lengths s (N,) m."""
     u = arc.parameter(s)
     pull = path.at(u, 1)
     return path.at(u), unit_vectors(pull)
 
 
 def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
-    """(N - 1,) m that the Bezier segments between nodes (N,) m are off the path at the same lengths along it."""
+    """Measure how far (N - 1,) m the Bezier segments between nodes (N,) m are off the path."""
     places, pull = _nodes(path, arc, nodes)
     gap = np.diff(nodes)[:, None, None]
     t = np.linspace(0.0, 1.0, 9)[1:-1, None]
@@ -311,7 +351,7 @@ def _beside(path: Path, arc, nodes: np.ndarray) -> np.ndarray:
 
 
 def _close_enough(path: Path, degree: int) -> np.ndarray:
-    """The fewest control points whose spline is within _CLOSE of the path."""
+    """Fit the fewest control points whose spline is within _FIT_TOLERANCE of the path."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
     from ...beyond_mocap.path_editing import path_line
 
@@ -327,7 +367,7 @@ def _close_enough(path: Path, degree: int) -> np.ndarray:
 
 
 def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None:
-    """Move a new curve's last point on where it is shorter than the path, so that the motion does not end early."""
+    """Extend a new curve that is shorter than the path, so that the motion does not end early."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
     spline = made.data.splines[0]
@@ -350,7 +390,7 @@ def _as_long(scene: bpy.types.Scene, made: bpy.types.Object, path: Path) -> None
 
 
 def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
-    """Even points (P, 3) of a straight line, as long as the path."""
+    """Scale even points (P, 3) of a straight line to the length of the path."""
     from ...beyond_mocap.motion.path.arc_length import ArcLength
 
     whole = points[-1] - points[0]
@@ -358,7 +398,7 @@ def _lengthened(points: np.ndarray, path: Path) -> np.ndarray:
 
 
 def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
-    """A mesh object as it is shown: vertices (V, 3) in the world, in Blender's units, and triangles (F, 3)."""
+    """Read an evaluated mesh object: vertices (V, 3) in the world, Blender units, and triangles (F, 3)."""
     shown = ground.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = shown.to_mesh()
     places, corners = _vertices(mesh), np.empty(3 * len(mesh.loop_triangles), np.int32)
@@ -369,7 +409,7 @@ def _mesh(ground: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _vertices(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Places (V, 3) of a mesh, in its own space."""
+    """Read the vertices (V, 3) of a mesh, in its own space."""
     places = np.empty(3 * len(mesh.vertices), np.float32)
     mesh.vertices.foreach_get("co", places)
     return places.reshape(-1, 3)

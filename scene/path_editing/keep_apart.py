@@ -1,8 +1,8 @@
-"""Riders keep apart: which of them come too near each other, or another body, and what each is asked to do about it.
+"""Collision avoidance of edited bodies: who comes too near each other, or another body, and what they change.
 
-What is asked is part of a rider's settings: seconds added to its delay, and detours of its path. Each time it is worked
-out from the curves as they are drawn and the delays that the user chose. Riders keep clear of bystanders too: bodies of
-the scene that ride no path, such as kept ones and players.
+Changes are part of a path edit's settings: seconds added to its delay, and detours of its path. They are computed each
+time from the curves as drawn and the delays that the user chose. Edited bodies also avoid bystanders: bodies of the
+scene without a path, such as those of applied edits and of players.
 """
 
 from __future__ import annotations
@@ -25,16 +25,25 @@ from .rigs import carrier_of, rides_as_rig
 from .settings import riders as all_riders
 from .settings import wishes
 
-_ROUNDS = 2  # the second with room for what the search does not reckon with exactly
+_ROUNDS = 2  # the second with a larger distance, for what the search does not compute exactly
 
-HIPS = 0.9  # metres that hips are above the ground, about: only whether bodies are on one floor depends on it
-_A_SECOND = 5  # looks at a rig
-_PATIENCE = 4.0  # seconds for all
+HIPS = 0.9  # metres of hips above the ground, about: only decides whether bodies are on the same floor
+_A_SECOND = 5  # samples of a rig in a second
+_PATIENCE = 4.0  # seconds for all bystanders
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What it takes to work out where a rider is with another delay and other detours, nothing of Blender's."""
+    """What is needed to compute a body with another delay and other detours; no Blender data.
+
+    Attributes:
+        name: of the body.
+        first: scene frame of the first frame.
+        known: `PathEditSource` of the core.
+        path: the new path.
+        settings: `PathEditSettings` of the core.
+        ground: the terrain, or None.
+    """
 
     name: str
     first: int
@@ -44,7 +53,7 @@ class Trial:
     ground: object
 
     def follower(self, change, may_change: bool = True):
-        """The rider with a `Change` as a body of the core; its feet do not matter here."""
+        """Compute the body with a `PathChange` as a follower of the core; its feet are not planted."""
         from ...beyond_mocap.path_editing.detour import Follower
         from ...beyond_mocap.path_editing.ride import ride
 
@@ -60,8 +69,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Kept:
-    """What came out. bodies: names of the riders, in the order of changes. before: how many collisions there were;
-    changes: one `Change` a rider; left: lines about those that stay, and about who was left out."""
+    """The result of collision avoidance.
+
+    Attributes:
+        bodies: names of the edited bodies, in the order of changes.
+        before: number of initial collisions.
+        changes: one `PathChange` a body.
+        unresolved: messages about collisions that remain, and about bodies that are left out.
+    """
 
     bodies: tuple[str, ...]
     before: int
@@ -70,10 +85,19 @@ class Kept:
 
 
 def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limits) -> Kept:
-    """What these riders have to do to keep apart within `limits` of the core; the scene stays as it is.
+    """Compute the changes that keep edited bodies apart; the scene stays as it is.
 
-    All other riders stay where they are, and so do those who ride nowhere (see `bystanders`). InputError where a rider
-    cannot ride."""
+    All other edited bodies keep their motion, and so do bystanders.
+
+    Args:
+        context: for scene and view layer.
+        bodies: the edited bodies that can yield.
+        limits: `Limits` of the core.
+    Returns:
+        The changes and messages.
+    Raises:
+        InputError: if a body cannot follow its path.
+    """
     from ...beyond_mocap.path_editing.apart import resolved
     from ...beyond_mocap.path_editing.detour import Change
 
@@ -102,7 +126,9 @@ def worked_out(context: bpy.types.Context, bodies: list[bpy.types.Object], limit
 
 
 def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None:
-    """Ask riders for these changes and bring them up to date. InputError, and all as before, if one cannot follow."""
+    """Apply changes to edited bodies and update them. Raises InputError, and restores everything, if one cannot
+    follow.
+    """
     from ...beyond_mocap.path_editing.detour import Change
 
     rides = [body.beyond_mocap_ride for body in bodies]
@@ -123,12 +149,12 @@ def lay(scene: bpy.types.Scene, bodies: list[bpy.types.Object], changes) -> None
 
 
 def lines_of(kept: Kept) -> list[str]:
-    """What each rider is asked to do, and what stays."""
+    """Describe the change of each body, and the remaining collisions."""
     return [line for line in map(_asked, kept.bodies, kept.changes) if line] + list(kept.left)
 
 
 def _trial(scene, body) -> Trial:
-    """A rider as it is without what it was asked before."""
+    """Build the trial of a body without its previous changes."""
     from ...beyond_mocap.path_editing.ride import RideSettings
 
     ride, carrier = body.beyond_mocap_ride, carrier_of(body)
@@ -141,12 +167,12 @@ def _trial(scene, body) -> Trial:
 
 
 def _own_delay(ride) -> float:
-    """The delay that the user chose."""
+    """Compute the delay that the user chose."""
     return max(ride.delay - ride.added, 0.0)
 
 
 def _others(scene, bodies) -> list:
-    """Other riders as they are; those that cannot ride just now, which is told at them, stand in nobody's way."""
+    """Compute the other edited bodies as they are; those that cannot follow their path now are ignored."""
     from ...beyond_mocap.path_editing.detour import Change
 
     found = []
@@ -162,7 +188,7 @@ def _others(scene, bodies) -> list:
 
 
 def _met(followers, limits) -> list:
-    """The collisions of bodies as they are."""
+    """Find the collisions of bodies as they are."""
     from ...beyond_mocap.path_editing.collisions import collisions
 
     times = np.unique(np.concatenate([follower.times for follower in followers]))
@@ -171,7 +197,7 @@ def _met(followers, limits) -> list:
 
 
 def _whole_frames(change, trial):
-    """A change that waits for whole frames, as riders do."""
+    """Round the wait of a change up to whole frames, as edited bodies wait."""
     fps = trial.known.motion.fps
     return replace(change, delay=float(np.ceil(round(change.delay * fps, 3)) / fps))
 
@@ -180,12 +206,12 @@ def _asked(name, change) -> str:
     parts = [f"waits {change.delay:.2f} s"] if change.delay else []
     ways = _joined(change.detours)
     sides = {True: "left", False: "right"}
-    parts += [f"goes {abs(offset):.2f} m to the {sides[offset > 0]} at {arc:.1f} m" for arc, offset in ways]
+    parts += [f"moves {abs(offset):.2f} m to the {sides[offset > 0]} at {arc:.1f} m" for arc, offset in ways]
     return f"{name} {', '.join(parts)}" if parts else ""
 
 
 def _joined(detours) -> list[tuple[float, float]]:
-    """(arc, offset) of detours; those side by side that make one long one only once, where it begins."""
+    """List (arc, offset) of detours; consecutive ones that form one long detour only once, at its start."""
     found, end = [], None
     for arc, width, offset in sorted(detours):
         if end is None or arc - 0.5 * width > end or not found or found[-1][1] != offset:
@@ -201,9 +227,14 @@ def _line(hit, names, fps) -> str:
 
 
 def bystanders(context: bpy.types.Context, patience: float = _PATIENCE) -> tuple[list, list[str]]:
-    """Followers of the core that cannot be asked to give way: the bodies of players, and all other animated armatures
-    that are visible and do not hang on a rider. And a line for each that is left out: for want of time after `patience`
-    seconds, or since it cannot be read."""
+    """Compute followers of the core that cannot yield: players' bodies and other visible animated armatures.
+
+    Args:
+        context: for scene and view layer.
+        patience: seconds after which bodies are left out.
+    Returns:
+        The followers, and a message for each body that is left out: for lack of time, or because it cannot be read.
+    """
     begun, found, left = perf_counter(), [], []
     for body in sorted(_bodies(context), key=rides_as_rig):  # the quick ones first
         try:
@@ -222,7 +253,7 @@ def _bodies(context) -> list[bpy.types.Object]:
 
 
 def _hangs_on_rider(body) -> bool:
-    """Whether it shows what a rider does, as a character does that was retargeted from it."""
+    """Return whether an armature copies an edited body, as a character retargeted from it does."""
     constraints = [one for thing in (body, *body.pose.bones) for one in thing.constraints if not one.mute]
     holders = [getattr(one, "target", None) for one in constraints]
     while body.parent is not None:
@@ -232,25 +263,25 @@ def _hangs_on_rider(body) -> bool:
 
 
 def _follower(scene, body, until: float):
-    """Where its hips are over the ground. InputError past the time `until`."""
+    """Compute the place of a body's hips over the ground. Raises InputError after the time `until`."""
     from ...beyond_mocap.path_editing.detour import Follower
 
     if perf_counter() > until:
         raise _late()
     try:
         if rides_as_rig(body):
-            raise InputError(body.name, "a rig")
+            raise InputError(body.name, "is a rig")
         read = carrier_of(body).read(scene)
         frames, hips = read.first + np.arange(len(read.motion)), read.motion.root_positions
-    except BeyondMocapError:  # it is looked at instead
+    except BeyondMocapError:  # sample it instead
         frames, hips = _looked_at(scene, body, until)
     if not np.isfinite(hips).all():
-        raise InputError("its pose", "a place that is no number", "numbers", "look at its keys")
+        raise InputError("its pose", "a place with NaN or infinite values", "finite values", "check its keys")
     return Follower(name=body.name, times=frames / frames_per_second(scene), places=hips - (0.0, 0.0, HIPS))
 
 
 def _looked_at(scene, body, until: float) -> tuple[np.ndarray, np.ndarray]:
-    """Some frames (F,) and its hips (F, 3) on them, metres; the middle of its bones where it has no hips."""
+    """Sample some frames (F,) and the hips on them (F, 3), metres; the middle of all bones without hips."""
     frames = _frames(scene, body)
     parts = rig_parts.of_rig(body)
     names = [parts.shown["hips"]] if parts else [bone.name for bone in body.data.bones]
@@ -267,7 +298,7 @@ def _looked_at(scene, body, until: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _frames(scene, body) -> np.ndarray:
-    """Whole frames from the first to the last of its motion, about `_A_SECOND`."""
+    """Choose whole frames from the first to the last of a motion, about `_A_SECOND` in a second."""
     try:
         played = Played(body, scene).frames
         first, last = int(played[0]), int(played[-1])
@@ -280,5 +311,5 @@ def _frames(scene, body) -> np.ndarray:
 
 
 def _late() -> InputError:
-    found, expected = "too slow to be looked at as well", "a quick one"
-    return InputError("its rig", found, expected, "hide what is not needed, or bake its motion")
+    found, expected = "takes too long to sample", "a faster rig"
+    return InputError("its rig", found, expected, "hide bodies that are not needed, or bake its motion")

@@ -1,7 +1,8 @@
-"""A rider's keys, in place: only channels that are other than they were are written, all others stay as the original's.
+"""The keys of a path edit, written in place: only channels that differ are written, all others keep the original's
+keys.
 
-What of an action stands as in the original and what was written is remembered by the action's digest, so that undo,
-which brings back action and digest together, is known without looking at the keys.
+What was written is stored with the action's digest, so that undo, which restores action and digest together, is
+recognized without reading the keys.
 """
 
 from __future__ import annotations
@@ -19,8 +20,14 @@ Place = tuple[str, int]
 
 @dataclass
 class _Laid:
-    """What an action of ours holds: digest of what it was made of; first frame and values (N,) of the channels that are
-    written, all others are the original's; the original's channels sampled on whole frames, and whether in steps."""
+    """What an action of ours holds.
+
+    Attributes:
+        digest: of its inputs.
+        first: its first frame.
+        written: (N,) values of the channels written; all others are the original's.
+        tables: the original's channels sampled on whole frames, and whether they are stepped.
+    """
 
     digest: str = ""
     first: int = 0
@@ -32,30 +39,30 @@ _laid: dict[int, _Laid] = {}  # by session_uid of the action
 
 
 def forget() -> None:
-    """Nothing is remembered any more: another file is open."""
+    """Clear the cache when another file is opened."""
     _laid.clear()
 
 
 def refresh() -> None:
-    """The originals may have changed: their channels are read again, and what was written is not relied on."""
+    """Mark the originals as possibly changed: their channels are read again, and written channels are not trusted."""
     for known in _laid.values():
         known.digest, known.tables = "", {}
 
 
 def places(curve: bpy.types.FCurve) -> np.ndarray:
-    """Frames and values of a curve's keys: (2 n,)."""
+    """Read the frames and values of a curve's keys: (2 n,)."""
     values = np.empty(2 * len(curve.keyframe_points), np.float32)
     curve.keyframe_points.foreach_get("co", values)
     return values
 
 
 def columns(path: str, values: np.ndarray) -> dict[Place, np.ndarray]:
-    """Values (N, n) of a property, one channel each."""
+    """Split values (N, n) of a property into channels."""
     return {(path, index): column for index, column in enumerate(np.ascontiguousarray(values.T))}
 
 
 def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
-    """Let a copy of an original be ours, which carries `mark`: other slots and what we kept with the original go."""
+    """Turn a copy of an original into an action of ours with `mark`: other slots and stored properties are removed."""
     for slot in [slot for slot in made.slots if slot.identifier != identifier]:
         made.slots.remove(slot)
     for name in [name for name in made.keys() if name.startswith("beyond_mocap")]:
@@ -67,7 +74,7 @@ def begin(made: bpy.types.Action, identifier: str, mark: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """An action of ours and the original that it stands for, while they are written: curves by (path, index)."""
+    """An action of ours and its original while they are written; curves by (path, index)."""
 
     made: bpy.types.Action
     slot: object
@@ -76,19 +83,24 @@ class Sheet:
 
     @classmethod
     def of(cls, made, slot, original, original_slot) -> Sheet:
-        """The sheet of two actions and their slots."""
+        """Build the sheet of two actions and their slots."""
         return cls(made, slot, channels.curves(made, slot), channels.curves(original, original_slot))
 
     def added(self, path: str) -> bool:
-        """Whether a property has curves here that it does not have in the original."""
+        """Return whether a property has curves here that the original does not have."""
         return any((path, index) in self.curves and (path, index) not in self.sources for index in range(4))
 
 
 def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, digest: str) -> None:
-    """Let the channels hold the wanted values (N,) on whole frames from `first` on, and all others what the original
-    has.
+    """Write the target values to their channels on whole frames, and the original's keys to all others.
 
-    now: the digest that the action carries; digest: the one that it will carry."""
+    Args:
+        sheet: the actions.
+        first: scene frame of the first value.
+        targets: (N,) values by channel.
+        now: digest that the action has.
+        digest: digest that the action gets.
+    """
     known = _laid.setdefault(sheet.made.session_uid, _Laid())
     sure = bool(known.digest) and known.digest == now
     known.digest = ""
@@ -109,8 +121,17 @@ def lay(sheet: Sheet, first: int, wanted: dict[Place, np.ndarray], now: str, dig
 
 
 def sampled(sheet: Sheet, places: list[Place], whole: np.ndarray, shown: np.ndarray) -> dict[Place, np.ndarray]:
-    """The original's channels at frames `shown` (N,), between whole frames (T,): (N,) each. Channels that know whole
-    numbers only, as switches do, stay at those."""
+    """Sample the original's channels at fractional frames; channels with whole numbers only, such as switches, stay
+    stepped.
+
+    Args:
+        sheet: the actions.
+        places: the channels.
+        whole: (T,) whole scene frames.
+        shown: (N,) scene frames.
+    Returns:
+        (N,) values by channel.
+    """
     known = _laid.setdefault(sheet.made.session_uid, _Laid())
     found = {}
     for place in places:
@@ -123,14 +144,14 @@ def sampled(sheet: Sheet, places: list[Place], whole: np.ndarray, shown: np.ndar
 
 
 def settle(sheet: Sheet) -> None:
-    """Written channels need the original's modifiers no more: they are in the keys."""
+    """Remove the muted modifiers of the original from written channels: their effect is in the keys."""
     for curve in sheet.curves.values():
         for modifier in [modifier for modifier in curve.modifiers if modifier.mute]:
             curve.modifiers.remove(modifier)
 
 
 def rotation(mode: str, pose: np.ndarray) -> np.ndarray:
-    """Rotations (N, 4) as the values (N, n) of a bone's rotation mode, without jumps."""
+    """Convert rotations (N, 4) to the values (N, n) of a bone's rotation mode, without jumps."""
     if mode == "QUATERNION":
         return quaternion.continuous(pose)
     if mode == "AXIS_ANGLE":
@@ -144,7 +165,7 @@ def rotation(mode: str, pose: np.ndarray) -> np.ndarray:
 
 
 def _continuous(turns: np.ndarray) -> np.ndarray:
-    """Euler angles (N, 3) without jumps: of each rotation (a, b, c) or (a + pi, pi - b, c + pi)."""
+    """Remove the jumps of Euler angles (N, 3): each rotation is (a, b, c) or (a + pi, pi - b, c + pi)."""
     other = np.stack([turns[:, 0] + np.pi, np.pi - turns[:, 1], turns[:, 2] + np.pi], axis=1)
     stay = np.abs(quaternion.wrapped(turns[1:] - turns[:-1])).sum(axis=1)
     swap = np.abs(quaternion.wrapped(other[1:] - turns[:-1])).sum(axis=1)
@@ -153,7 +174,7 @@ def _continuous(turns: np.ndarray) -> np.ndarray:
 
 
 def _restore(sheet: Sheet, place: Place) -> None:
-    """One channel as in the original."""
+    """Restore one channel from the original."""
     source, curve = sheet.sources[place], _curve(sheet, place)
     curve.keyframe_points.clear()
     channels.put_keys(curve, channels.keys_of(source))
@@ -162,7 +183,7 @@ def _restore(sheet: Sheet, place: Place) -> None:
 
 
 def _write(sheet: Sheet, place: Place, keys: np.ndarray, fresh: bool) -> None:
-    """Keys (N, 2) of one channel; fresh: what stands there may be anything."""
+    """Write keys (N, 2) of one channel; fresh: the previous keys may be anything."""
     curve = _curve(sheet, place)
     points = curve.keyframe_points
     if len(points) != len(keys):

@@ -1,11 +1,11 @@
-"""Riders follow while curves, settings and grounds are edited, also while a point is being dragged; once at rest, their
-figures are worked out.
+"""Live updates: edited bodies follow while curves, settings and grounds are edited; at rest, their figures are
+measured.
 
-Blender says after every change that something has changed; a timer, which runs during modal operators too, then
-compares what each rider's motion was made of with what there is now. Our own writes are such changes too, and find
-nothing to do. An edit from a timer is no undo step: undo brings back the state before, and riders are brought up to
-date with that. Figures (on the path, at their speed, on their feet) take longer than a picture while a path is dragged,
-so a thread works them out; they are kept as JSON with the rider.
+Blender reports that something has changed after every change; a timer, which runs during modal operators too, then
+compares the inputs of each path edit with the present ones. Our own writes are such changes too, and lead to no work.
+An edit from a timer is no undo step: undo restores the state before, and edited bodies are updated to that. Figures
+(distance, speed, feet) take longer than one redraw while a path is dragged, so a thread computes them; they are stored
+as JSON with the armature.
 """
 
 from __future__ import annotations
@@ -26,27 +26,27 @@ from .settings import riders
 
 MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Mesh, bpy.types.Armature, bpy.types.Action, bpy.types.Scene)
 KIND = "path figures"
-REST, LOOK, WAIT = 0.8, 0.4, 0.05  # seconds: without a change, between two looks, between two looks at the thread
-KNOWN = '"root_error_m"'  # in the figures of a rider that was measured
+REST, LOOK, WAIT = 0.8, 0.4, 0.05  # seconds: without a change before measuring, between two checks, during a job
+KNOWN = '"root_error_m"'  # in the figures of a body that was measured
 
-_failed: dict[int, int] = {}  # by session_uid of the armature: the number of what could not be measured
-_since: dict[int, tuple[int, float]] = {}  # likewise: the number of what is shown, and since when
+_failed: dict[int, int] = {}  # by session_uid of the armature: number of the edit that could not be measured
+_since: dict[int, tuple[int, float]] = {}  # likewise: number of the current edit, and since when
 _running: list[tuple[background.Job, int, int]] = []  # at most one, with the armature's session_uid and the number
 
 
 def follow(scene: bpy.types.Scene) -> int:
-    """Bring all live riders of a scene up to date; how many had to be. Those that cannot follow are told why."""
+    """Update all live edited bodies of a scene; returns how many changed. Errors become messages of the body."""
     count = 0
     for body in riders(scene):
         if not body.beyond_mocap_ride.live or body.mode == "EDIT" or body.library is not None:
             continue
-        failed = f"{body.name}: the motion could not be worked out here"
+        failed = f"{body.name}: the motion cannot be computed"
         count += bool(attempt(lambda: rides.renew(scene, body), partial(rides.tell, body.beyond_mocap_ride), failed))
     return count
 
 
 def measure(scene: bpy.types.Scene, body: bpy.types.Object) -> None:
-    """Work out a rider's figures at once; nothing happens where it was not brought up to date in this session."""
+    """Measure an edited body at once; nothing happens if this session has not computed it."""
     shown = rides.shown(body)
     if shown is not None:
         _keep(body, _figures(shown, _ground(scene, body)))
@@ -64,12 +64,13 @@ def _ground(scene: bpy.types.Scene, body: bpy.types.Object):
 
 
 def _keep(body: bpy.types.Object, figures: dict) -> None:
-    """Beside those that are known while a path is dragged."""
+    """Store figures beside those that are computed while a path is dragged."""
     ride = body.beyond_mocap_ride
     ride.figures = json.dumps({**(json.loads(ride.figures) if ride.figures else {}), **figures})
 
 
 def _tick() -> float:
+    """Check once: start to measure a body at rest, or collect a result; returns the seconds until the next check."""
     if bpy.app.is_job_running("RENDER"):
         return LOOK
     if _running:
@@ -81,7 +82,7 @@ def _tick() -> float:
     try:
         with bpy.context.temp_override(window=window):  # a timer has none, and the ground is the window's
             ground = _ground(window.scene, waiting)
-    except BeyondMocapError:  # told where the rider is brought up to date
+    except BeyondMocapError:  # reported where the body is updated
         _failed[waiting.session_uid] = shown.number
         return LOOK
     _running.append((background.Job(KIND, lambda *_: _figures(shown, ground)), waiting.session_uid, shown.number))
@@ -89,12 +90,12 @@ def _tick() -> float:
 
 
 def _seen() -> list[tuple[bpy.types.Window, bpy.types.Object]]:
-    """The riders of all windows' scenes."""
+    """List the edited bodies of the scenes of all windows."""
     return [(window, body) for window in bpy.context.window_manager.windows for body in riders(window.scene)]
 
 
 def _waits(body: bpy.types.Object) -> bool:
-    """Whether what is shown of a rider has been the same for a while, and is not measured."""
+    """Return whether an edited body has been at rest for a while and is not measured."""
     shown, uid = rides.shown(body), body.session_uid
     if shown is None or KNOWN in body.beyond_mocap_ride.figures or _failed.get(uid) == shown.number:
         return False
@@ -104,6 +105,7 @@ def _waits(body: bpy.types.Object) -> bool:
 
 
 def _collect() -> float:
+    """Store the result of a finished job if its body has not changed since."""
     job, uid, number = _running[0]
     if not job.poll():
         return WAIT
@@ -112,14 +114,14 @@ def _collect() -> float:
     shown = rides.shown(body) if body is not None else None
     if job.error is not None:
         _failed[uid] = number
-        print(f"Beyond Mocap: no figures of a ride: {job.error}")
+        print(f"Beyond Mocap: cannot measure a path edit: {job.error}")
     elif shown is not None and shown.number == number:
         _keep(body, job.result)
     return LOOK
 
 
 def forget() -> None:
-    """Measure no more."""
+    """Stop measuring."""
     background.stop(KIND)
     for kept in (_failed, _since, _running):
         kept.clear()
@@ -128,6 +130,6 @@ def forget() -> None:
 WATCHER = Watcher(
     name="Path editing", matters=MATTERS, follow=follow, restored=recheck_sources, loaded=rides.forget,
     ends=rides.forget,
-    framed=lambda _scene: WATCHER.mark(),  # an edit that a change of frame brings into force is told by nothing else
+    framed=lambda _scene: WATCHER.mark(),  # the only report of edits that take effect with a change of frame
 )
 FIGURES = Watcher(name="Figures of path editing", look=_tick, ends=forget)

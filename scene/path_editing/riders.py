@@ -1,4 +1,4 @@
-"""Riders: armatures whose motion rides a curve. Begun, brought up to date, kept or ended; what the buttons do."""
+"""Start, update, apply and revert path edits of armatures; the work behind the buttons."""
 
 from __future__ import annotations
 
@@ -19,15 +19,22 @@ from .rigs import carrier_of
 from .settings import choose, riders, wishes
 
 _SAMPLES = 400
-MOST_FRAMES = 40_000  # of a cycled motion, about: worked out again while a path is dragged, more would take minutes
+MOST_FRAMES = 40_000  # of a cycled motion, about: it is computed at every change, and more would take minutes
 
 
 @dataclass(frozen=True, eq=False)
 class Shown:
-    """What was worked out for a rider: plain numbers, in metres of the scene's world.
+    """The computed path edit of an armature: plain values, metres in the scene's world.
 
-    first: scene frame of the first frame; fps; source, path, ridden: of the core; number: another each time it is
-    worked out; told: lines for the user."""
+    Attributes:
+        first: scene frame of the first frame.
+        fps: frames per second.
+        source: `PathEditSource` of the core.
+        path: the new path.
+        edited: `EditedMotion` of the core.
+        number: a counter, new for each computation.
+        messages: lines for the user.
+    """
 
     first: int
     fps: float
@@ -39,26 +46,26 @@ class Shown:
 
     @cached_property
     def source_line(self) -> np.ndarray:
-        """The original path (N, 3)."""
+        """(N, 3) metres, the original path."""
         return _along(self.source.path)
 
     @cached_property
     def line(self) -> np.ndarray:
-        """The new path (N, 3)."""
+        """(N, 3) metres, the new path."""
         return _along(self.path)
 
     def frames(self, frame: float) -> tuple[int, int]:
-        """Index of the ridden frame at a scene frame, and of the original's that is shown there; both within range."""
+        """Compute the edited frame at a scene frame and the original frame that it displays, both within range."""
         own = int(np.clip(round(frame - self.first), 0, len(self.ridden.motion) - 1))
         return own, int(np.clip(round(self.ridden.frames[own]), 0, len(self.source.motion) - 1))
 
 
-_shown: dict[int, tuple[str, Shown]] = {}  # by session_uid of the armature: digest, what was worked out
+_shown: dict[int, tuple[str, Shown]] = {}  # by session_uid of the armature: digest and result
 _counted = 0
 
 
 def forget() -> None:
-    """Nothing is remembered any more: another file is open."""
+    """Clear all caches when another file is opened."""
     _shown.clear()
     forget_sources()
     curve.forget_grounds()
@@ -66,24 +73,31 @@ def forget() -> None:
 
 
 def anybody_shown() -> bool:
-    """Whether anything was worked out for any rider; quick, since it is asked at every redraw."""
+    """Return whether any path edit has been computed; fast, since every redraw calls it."""
     return bool(_shown)
 
 
 def shown(body: bpy.types.Object) -> Shown | None:
-    """What was worked out for a rider last; None where nothing was in this session."""
+    """Find the last computed path edit of an armature; None if this session has none."""
     digest, known = _shown.get(body.session_uid, ("", None))
     if known is None or not body.beyond_mocap_ride.on:
         return None
     played = channels.playing(body)[0]
-    return known if played is not None and played.get(MARK) == digest else None  # undo may have brought back another
+    return known if played is not None and played.get(MARK) == digest else None  # undo may have restored another
 
 
 def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) -> bool:
-    """Bring a rider's motion up to date with curve and settings; whether anything had to be worked out.
+    """Update an armature's motion from its curve and settings.
 
-    anew: look at everything and write it, whether or not it seems to have changed. InputError, and the motion as it
-    was, where that makes no sense just now."""
+    Args:
+        scene: of the armature.
+        body: the edited armature.
+        force: check all sources again and write the motion even if it seems unchanged.
+    Returns:
+        Whether anything was computed.
+    Raises:
+        InputError: if it cannot be computed at present; the motion stays as it was.
+    """
     from ...beyond_mocap.path_editing.ride import RideSettings, ride
 
     global _counted
@@ -101,7 +115,7 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
     up_to_date, remembered = made[MARK] == digest, _shown.get(body.session_uid, ("", None))[0] == digest
     if up_to_date and remembered and not anew:
         lines = _lines(scene, ridden_by, digest, _shown[body.session_uid][1])
-        tell(ridden_by, lines)  # what was wrong meanwhile is so no more
+        tell(ridden_by, lines)  # removes messages about problems that are solved
         return False
     path = drawn.path()
     _check_length(known.core, path, settings)
@@ -118,25 +132,26 @@ def renew(scene: bpy.types.Scene, body: bpy.types.Object, anew: bool = False) ->
 
 
 def _lines(scene: bpy.types.Scene, ride, digest: str, now: Shown) -> str:
-    """What is told of a rider; also where, other than the original, it goes on beyond the scene's end, and where it is
-    another than when riders were asked to keep apart."""
+    """Build the messages of a path edit, also where it ends beyond the scene, or changed since collisions were
+    avoided.
+    """
     lines, last = [now.told] if now.told else [], now.first + len(now.ridden.motion) - 1
     if last > max(scene.frame_end, now.first + len(now.source.motion) - 1):
-        lines.append(f"goes on to frame {last}, the scene ends at {scene.frame_end}")
+        lines.append(f"the motion ends at frame {last}, after the end of the scene at {scene.frame_end}")
     if ride.agreed not in ("", digest):
-        lines.append("changed since Keep Apart: press it again")
+        lines.append("changed since Avoid Collisions: press it again")
     return "\n".join(lines)
 
 
 def _check_length(known, path, settings) -> None:
-    """InputError where a motion would have to be repeated for ever."""
+    """Raise InputError if a cycled motion would become too long."""
     if not settings.cycle or known.arc.length <= 0.0:
         return
     metres, motion = np.linalg.norm(np.diff(_along(path), axis=0), axis=1).sum(), known.motion
     frames = len(motion) * metres / known.arc.length / settings.speed
     if frames > MOST_FRAMES:
-        found = f"the motion would last {frames / motion.fps / 60.0:.0f} minutes on a path of {metres:.0f} m"
-        raise InputError("cycle", found, f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes at most",
+        found = f"the motion takes {frames / motion.fps / 60.0:.0f} minutes on a path of {metres:.0f} m"
+        raise InputError("cycle", found, f"{MOST_FRAMES / motion.fps / 60.0:.0f} minutes or less",
                          "shorten the path, or switch Cycle off")
 
 
@@ -144,14 +159,24 @@ def begin(
     context: bpy.types.Context, body: bpy.types.Object, drawn: bpy.types.Object | None = None, count: int = 0,
     kind: str = "BEZIER", degree: int = 3, straight: bool = False,
 ) -> bpy.types.Object:
-    """Let an armature ride `drawn`, or a new curve along its own path (see `curve.create`); its action is put aside.
-    Returns the curve. InputError, and nothing changed, where it cannot."""
+    """Start a path edit: on a given curve, or on a new one along the armature's own path; its action is stored.
+
+    Args:
+        context: for scene and view layer.
+        body: the armature.
+        drawn: a curve object; None to create one.
+        count, kind, degree, straight: of a new curve, see `curve.create_curve`.
+    Returns:
+        The curve object.
+    Raises:
+        InputError: if the armature cannot be edited; nothing is changed.
+    """
     from ...beyond_mocap.path_editing.ride import RideSettings
 
     scene, ride, carrier = context.scene, body.beyond_mocap_ride, carrier_of(body)
     if ride.on:
-        raise InputError(f"armature {body.name}", "it rides already", "one that does not",
-                         "edit its curve, or press Leave")
+        raise InputError(f"armature {body.name}", "already follows a path", "an armature without a path edit",
+                         "edit its curve, or press Revert")
     carrier.check()
     context.view_layer.update()
     recheck_sources()
@@ -175,7 +200,7 @@ def begin(
 
 
 def revert(body: bpy.types.Object, before: bpy.types.Object | None, made: bpy.types.Object | None) -> None:
-    """As before `begin`: the curve that the armature had before, and the one that was made for it taken away."""
+    """Undo `start_path_edit`: restore the previous curve and remove the one created for the edit."""
     end(body)
     body.beyond_mocap_ride.curve = before
     if made is not None:
@@ -183,7 +208,7 @@ def revert(body: bpy.types.Object, before: bpy.types.Object | None, made: bpy.ty
 
 
 def change(scene: bpy.types.Scene, body: bpy.types.Object, drawn: bpy.types.Object) -> None:
-    """Let a rider ride another curve. InputError, and nothing changed, where it cannot."""
+    """Let an edited armature follow another curve. Raises InputError, and changes nothing, where it cannot."""
     ride = body.beyond_mocap_ride
     before, ride.curve = ride.curve, drawn
     try:
@@ -197,8 +222,20 @@ def new_curve(
     context: bpy.types.Context, body: bpy.types.Object, shape: str = "FITTED", count: int = 0, kind: str = "BEZIER",
     degree: int = 3,
 ) -> bpy.types.Object:
-    """Another curve for a rider; shape: one of `curve.SHAPES`. The one before is removed where it was made here and
-    nobody else rides it. Returns the new one."""
+    """Create another curve for an edited armature and let it follow that.
+
+    The previous curve is removed if the extension created it and no other armature follows it.
+
+    Args:
+        context: for scene and view layer.
+        body: the edited armature.
+        shape: one of `curve.SHAPES`.
+        count, kind, degree: of the new curve, see `curve.create_curve`.
+    Returns:
+        The new curve object.
+    Raises:
+        InputError: if the motion cannot follow it; nothing is changed.
+    """
     from ...beyond_mocap.path_editing.ride import RideSettings
 
     scene, ride = context.scene, body.beyond_mocap_ride
@@ -223,8 +260,13 @@ def new_curve(
 
 
 def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Action, str]:
-    """The ridden motion becomes an ordinary action of the armature; the original stays in the file. Where it cannot be
-    brought up to date, the last that could is kept. Returns the action, and why it is not up to date."""
+    """Apply a path edit: the edited motion becomes an ordinary action; the original action stays in the file.
+
+    If the motion cannot be updated, its last state is applied.
+
+    Returns:
+        The action, and why it is not up to date ("" if it is).
+    """
     ride, carrier, told = body.beyond_mocap_ride, carrier_of(body), ""
     may_keep(body)
     try:
@@ -244,35 +286,35 @@ def keep(scene: bpy.types.Scene, body: bpy.types.Object) -> tuple[bpy.types.Acti
 
 
 def may_end(body: bpy.types.Object) -> None:
-    """InputError where an armature's original motion cannot be brought back here."""
+    """Raise InputError if an armature's original motion cannot be restored here."""
     channels.check_local(body)
     channels.check_free(body)
 
 
 def may_keep(body: bpy.types.Object) -> None:
-    """InputError where an armature's ridden motion cannot become its own here."""
+    """Raise InputError if an armature's edited motion cannot be applied here."""
     may_end(body)
     carrier_of(body).ours()
 
 
 def end(body: bpy.types.Object) -> None:
-    """The armature plays its original motion again, to the last bit."""
+    """Revert a path edit: the armature plays its original motion again, bit for bit."""
     carrier_of(body).end()
     _over(body.beyond_mocap_ride)
 
 
 def leave(*bodies: bpy.types.Object | None) -> list[str]:
-    """Riders among these play their originals again, for something else is to be done with them; a line for each."""
+    """Revert the path edits among these armatures before another edit of them; returns a message for each."""
     riding = [body for body in bodies if body is not None and body.beyond_mocap_ride.on]
     for body in riding:
         may_end(body)
     for body in riding:
         end(body)
-    return [f"{body.name} left its path first: its curve stays, Edit Path takes it up again" for body in riding]
+    return [f"{body.name}: path edit reverted; its curve stays, press Edit Path to use it again" for body in riding]
 
 
 def standing(body: bpy.types.Object | None):
-    """Function from scene frames (F,) to which feet stand (F, 2) while an armature rides; None where not known."""
+    """Build a function from scene frames (F,) to foot contacts (F, 2) of an edited armature; None where unknown."""
     now = shown(body) if body is not None else None
     if now is None:
         return None
@@ -286,7 +328,7 @@ def standing(body: bpy.types.Object | None):
 
 
 def back_to(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:
-    """Where a curve was active that nobody rides any more, the armatures that did are chosen."""
+    """Select the armatures again if an active curve is no longer the path of any armature."""
     active = context.view_layer.objects.active
     if context.mode != "OBJECT" or active is None or active.type != "CURVE":
         return
@@ -299,7 +341,7 @@ def back_to(context: bpy.types.Context, bodies: list[bpy.types.Object]) -> None:
 
 
 def _own_path(known, straight: bool):
-    """The path for a new curve, and whether it is to be straight: of who stands still two metres straight ahead."""
+    """Choose the path of a new curve, and whether it is straight: two metres straight ahead for a motion in place."""
     from ...beyond_mocap.motion.path.path import SplinePath
     from ...beyond_mocap.path_editing.path_line import SHORTEST
 
@@ -311,7 +353,7 @@ def _own_path(known, straight: bool):
 
 
 def _figures(known, ridden) -> dict:
-    """What a panel says of a result, in metres and seconds."""
+    """Summarize a result for the panel, in metres and seconds."""
     motion = ridden.motion
     return {"seconds": round(motion.duration, 3), "source_seconds": round(known.motion.duration, 3),
             "metres": round(float(ridden.arc[-1] - ridden.arc[0]), 3),
@@ -321,8 +363,10 @@ def _figures(known, ridden) -> dict:
 
 
 def tell(ride, lines: str, figures: dict | None = None) -> None:
-    """Note lines for the panel, such as why a rider could not follow, and figures. Only what is new is written: each
-    write is a change of the object, which is looked at again."""
+    """Store messages, such as why a motion cannot follow its path, and figures for the panel.
+
+    Only changes are written, since each write changes the object and triggers another check.
+    """
     if ride.told != lines:
         ride.told = lines
     text = json.dumps(figures) if figures is not None else ride.figures
@@ -331,7 +375,7 @@ def tell(ride, lines: str, figures: dict | None = None) -> None:
 
 
 def _over(ride) -> None:
-    """A rider no more; a curve or ground that was deleted is not kept in the file for its sake."""
+    """End a path edit; a curve or ground that was deleted is not kept in the file."""
     ride.on = False
     ride.told = ride.figures = ""
     for name in ("curve", "ground"):

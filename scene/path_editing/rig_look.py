@@ -1,7 +1,7 @@
-"""What Blender shows of an armature, frame by frame: constraints, drivers, NLA and parents counted in.
+"""Sample what Blender shows of an armature, frame by frame, with constraints, drivers, NLA and parents.
 
-Looked at in a scene of its own, so that the user's scene stays at its frame with its poses as they are, and nothing
-else in it has to be worked out for every frame.
+Sampling uses a scene of its own, so that the user's scene stays at its frame with its poses, and nothing else in it is
+evaluated for every frame.
 """
 
 from __future__ import annotations
@@ -21,9 +21,18 @@ _WIDTHS = {"location": 3, "rotation_quaternion": 4, "rotation_euler": 3, "rotati
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """F frames of an armature. frames (F,) of the scene; lies (F, 4, 4): the object in the world, units; basis
-    (F, 4, 4): its own share of that; bones: their names; poses (F, B, 4, 4) in the armature's space; modes: rotation
-    mode of each bone; channels: channel -> (F, B, n); others: data path -> (F, n) of what else was asked for."""
+    """F sampled frames of an armature.
+
+    Attributes:
+        frames: (F,) scene frames.
+        world_matrices: (F, 4, 4) matrices of the object, Blender units.
+        basis: (F, 4, 4) the object's own part of these.
+        bones: names.
+        poses: (F, B, 4, 4) pose matrices, armature space.
+        modes: rotation mode of each bone.
+        channels: channel -> (F, B, n) values.
+        others: data path -> (F, n) values of other requested properties.
+    """
 
     frames: np.ndarray
     lies: np.ndarray
@@ -35,22 +44,22 @@ class Look:
     others: dict[str, np.ndarray]
 
     def number(self, bone: str) -> int:
-        """A bone's number."""
+        """Find the index of a bone."""
         return self.bones.index(bone)
 
     def own(self, bone: int) -> np.ndarray:
-        """Rotations (F, 4) of a bone's own channels, whatever its rotation mode."""
+        """Compute the rotations (F, 4) of a bone's own channels, in any rotation mode."""
         mode = self.modes[bone]
         return turns(mode, self.channels[channel_of(mode)][:, bone])
 
 
 def channel_of(mode: str) -> str:
-    """The channel that counts in a rotation mode."""
+    """Return the rotation channel that a rotation mode uses."""
     return TURNS.get(mode, "rotation_euler")
 
 
 def turns(mode: str, values: np.ndarray) -> np.ndarray:
-    """Rotations (F, 4) of the values (F, n) of `channel_of` a rotation mode."""
+    """Convert the values (F, n) of a rotation mode's channel to rotations (F, 4)."""
     if mode == "QUATERNION":
         return quaternion.normalized(values)
     if mode == "AXIS_ANGLE":
@@ -61,8 +70,10 @@ def turns(mode: str, values: np.ndarray) -> np.ndarray:
 
 @contextmanager
 def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
-    """A scene in which only the armature (or another object) is, and what it hangs on, at the rate of `scene`; gone
-    afterwards. What is switched off or shown at rest is posed meanwhile."""
+    """Create a scene with only this object and what it depends on, at the rate of `scene`; it is removed afterwards.
+
+    Hidden objects, and armatures in rest position, are posed meanwhile.
+    """
     side = bpy.data.scenes.new(f"{rig.name} alone")
     hidden, position = rig.hide_viewport, rig.data.pose_position if rig.type == "ARMATURE" else "POSE"
     try:
@@ -84,7 +95,16 @@ def alone(rig: bpy.types.Object, scene: bpy.types.Scene):
 
 
 def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, others: list[str] = ()) -> Look:
-    """The armature at scene frames (F,), in the scene `alone`; others: data paths of more properties to note."""
+    """Sample an armature at scene frames.
+
+    Args:
+        rig: the armature.
+        side: the scene of `create_private_scene`.
+        frames: (F,) scene frames, fractional.
+        others: data paths of further properties to sample.
+    Returns:
+        The samples.
+    """
     count, bones = len(frames), [bone.name for bone in rig.pose.bones]
     poses = np.empty((count, len(bones), 4, 4), np.float32)
     lies, basis = np.empty((count, 4, 4)), np.empty((count, 4, 4))
@@ -107,7 +127,7 @@ def look(rig: bpy.types.Object, side: bpy.types.Scene, frames: np.ndarray, other
 
 
 def numbers_of(value) -> list[float]:
-    """A property's value as numbers."""
+    """Convert a property's value to a list of numbers."""
     try:
         return [float(one) for one in value]
     except TypeError:

@@ -1,7 +1,7 @@
-"""The body that a rig shows: which bones its parts can be seen on, which controls go with which part, and its motion.
+"""The body that a rig shows: the bones that show its parts, the controls of each part, and its motion.
 
-What moves a part (`bone_maps`) need not be what shows it: with inverse kinematics on, Rigify's FK controls stay behind.
-A part is seen on the bone that deforms the mesh where the control rests.
+The bone that moves a part (`bone_maps`) need not show it: with inverse kinematics on, Rigify's FK controls stay behind.
+A part is shown by the bone that deforms the mesh at the control's rest place.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .rig_look import Look
 
 _SAME, _ALONG = 0.01, 0.94  # of the rig's size; cosine
 _STRETCH, _OFF = 1e-3, 3e-4  # metres
-_UPRIGHT = 0.64  # cosine of the angle between a standing body's trunk and the vertical, at most
+_UPRIGHT = 0.64  # least cosine of the angle between the trunk and the legs of an upright body
 _FK_LIKE = re.compile(r"(?i)(?<![a-z])(fk|ctrl|control)(?![a-z])")
 _CARRIERS = {"neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine",), "upper_arm": ("shoulder", "spine"),
              "lower_arm": ("upper_arm",), "hand": ("lower_arm",), "lower_leg": ("upper_leg",), "foot": ("lower_leg",),
@@ -31,10 +31,18 @@ _CARRIERS = {"neck": ("spine",), "head": ("neck", "spine"), "shoulder": ("spine"
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What is known of a rig's body. controls: part -> the bone that moves it; shown: part -> the bone that shows it,
-    in the order of joints; follows: bones that a part follows or that go with it -> the part; trunk: likewise controls
-    that bend the spine beside its own ones (Rigify's chest), where they are animated; root: the bone that carries all,
-    "" where there is none. A rig that is no standing body has one part, "body", and no controls."""
+    """The identified parts of a rig.
+
+    A rig that is no upright body has one part, "body", and no controls.
+
+    Attributes:
+        controls: part -> the bone that moves it.
+        shown: part -> the bone that shows it, in the order of joints.
+        follows: bones that a part follows, or that move with it -> the part.
+        trunk: likewise animated controls that bend the spine beside its own ones (Rigify's chest).
+        root: the bone that carries everything, "" without one.
+        humanoid: whether it is an upright body.
+    """
 
     controls: dict[str, str]
     shown: dict[str, str]
@@ -45,7 +53,7 @@ class Parts:
 
 
 def of_rig(rig: bpy.types.Object) -> Parts | None:
-    """The parts of a standing body; None where the armature is none."""
+    """Identify the parts of an upright body; None for another armature."""
     try:
         table = bone_maps.kept(rig) or bone_maps.suggest(rig)
         bone_maps.check(rig, table)
@@ -63,7 +71,7 @@ def of_rig(rig: bpy.types.Object) -> Parts | None:
 
 
 def _shown(rig: bpy.types.Object, control: str) -> str:
-    """The bone that deforms the mesh where a control rests; the control itself where there is no other."""
+    """Find the bone that deforms the mesh at a control's rest place; the control itself without another."""
     bones = rig.data.bones
     own = bones[control]
     if own.use_deform and not _FK_LIKE.search(control):
@@ -87,7 +95,7 @@ def _size(rig: bpy.types.Object) -> float:
 
 
 def _pelvis(rig: bpy.types.Object, shown: dict[str, str]) -> str | None:
-    """The bone on which both thighs hang, where it is near them; a control that turns the hips may lie above it."""
+    """Find the bone from which both thighs hang, if it is near them; a control that turns the hips may be above it."""
     left, right = (rig.data.bones[shown[f"{side} upper_leg"]] for side in ("left", "right"))
     above = [bone.name for bone in left.parent_recursive]
     bone = next((bone for bone in right.parent_recursive if bone.name in above), None)
@@ -98,7 +106,7 @@ def _pelvis(rig: bpy.types.Object, shown: dict[str, str]) -> str | None:
 
 
 def _stands(rig: bpy.types.Object, shown: dict[str, str]) -> bool:
-    """Whether the trunk stands over the legs at rest: a quadruped's lies before them."""
+    """Return whether the trunk is above the legs at rest: a quadruped's is in front of them."""
     bones = rig.data.bones
     top = next((part for part in ("head", "neck", *(f"spine {i}" for i in range(bone_maps.SPINES, 0, -1)))
                 if part in shown), None)
@@ -112,12 +120,22 @@ def _stands(rig: bpy.types.Object, shown: dict[str, str]) -> bool:
 
 
 def upright(rig: bpy.types.Object, shown: dict[str, str]) -> np.ndarray:
-    """The turn (4,), by quarter turns, that lets the armature's space stand along Z and face +X."""
+    """Compute the rotation (4,), by quarter turns, that makes the armature's space upright along Z and facing +X."""
     return upright_turn({part: np.array(rig.data.bones[bone].head_local) for part, bone in shown.items()})
 
 
 def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps: float) -> Motion:
-    """The motion that the parts' bones show, metres, joints under the core's names. units: of the scene in a metre."""
+    """Build the motion that the parts' bones show.
+
+    Args:
+        rig: the armature.
+        parts: its parts.
+        seen: its samples.
+        units: Blender units in a metre.
+        fps: frames per second.
+    Returns:
+        The motion in metres, world frame, with the core's joint names.
+    """
     places, turns = in_world(seen, [seen.number(bone) for bone in parts.shown.values()], units)
     rest = np.array([rig.data.bones[bone].matrix_local.to_3x3() for bone in parts.shown.values()])
     stands = upright(rig, parts.shown) if parts.humanoid else quaternion.identity()
@@ -141,15 +159,16 @@ def motion_of(rig: bpy.types.Object, parts: Parts, seen: Look, units: float, fps
 
 
 def _constant(offsets: np.ndarray) -> np.ndarray:
-    """One offset (3,) for those of all frames (F, 3): the middle one, as long as the bone gets where it stretches."""
+    """Compute one offset (3,) for those of all frames (F, 3): their median, with the length of a stretched bone."""
     length, middle = np.linalg.norm(offsets, axis=1), np.median(offsets, axis=0)
     longest = np.percentile(length, 99.5)
     return middle * longest / np.linalg.norm(middle) if longest - np.median(length) > _STRETCH else middle
 
 
 def _feet_where_they_are(skeleton: Skeleton, names: list[str], places: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Local rotations (F, J, 4) with which the ankles are at their places (F, J, 3) although no bone stretches; what
-    stands in the rig stands in the motion, to be held there."""
+    """Solve local rotations (F, J, 4) that place the ankles at (F, J, 3) without stretch, so that contacts of the
+    rig hold.
+    """
     from ...beyond_mocap.motion.limb import two_bone  # this brings scipy, which is slow to import
 
     shown, _ = pose_kinematics(skeleton, places[:, 0], local)
@@ -161,19 +180,19 @@ def _feet_where_they_are(skeleton: Skeleton, names: list[str], places: np.ndarra
 
 
 def in_world(seen: Look, bones: list[int], units: float) -> tuple[np.ndarray, np.ndarray]:
-    """Places (F, n, 3) metres and rotations (F, n, 4) of bones in the world."""
+    """Compute places (F, n, 3) metres and rotations (F, n, 4) of bones in the world."""
     matrices = seen.lies[:, None] @ seen.poses[:, bones]
     return matrices[..., :3, 3] / units, rotations(matrices)
 
 
 def rotations(matrices: np.ndarray) -> np.ndarray:
-    """Rotations (..., 4) of matrices (..., 4, 4), whatever their scale."""
+    """Compute rotations (..., 4) of matrices (..., 4, 4) of any scale."""
     turn = matrices[..., :3, :3]
     return quaternion.from_matrix(turn / np.maximum(np.linalg.norm(turn, axis=-2, keepdims=True), 1e-12))
 
 
 def _parents(names: list[str]) -> list[int]:
-    """The joint on which each part hangs; the first is the root, and what is not known hangs on it."""
+    """Compute the parent joint of each part; the first is the root, and unknown parts hang on it."""
     found = []
     for number, name in enumerate(names):
         side, kind = name.partition(" ")[::2] if name.startswith(("left", "right")) else ("", name.partition(" ")[0])
@@ -187,7 +206,7 @@ def _parents(names: list[str]) -> list[int]:
 
 
 def _tips(rig, parts: Parts, parents: list[int], rest: np.ndarray, seen: Look, units: float):
-    """Joints that end a limb, and their tips in metres, as far as the bones' tails show them."""
+    """Compute the joints that end a limb, and their tips in metres where the bones' tails show them."""
     names, ends, tips = list(parts.shown), [], []
     size = float(np.cbrt(abs(np.linalg.det(seen.lies[0][:3, :3])))) / units
     for joint, (name, bone) in enumerate(parts.shown.items()):
@@ -206,7 +225,7 @@ def _tips(rig, parts: Parts, parents: list[int], rest: np.ndarray, seen: Look, u
 
 
 def whole(rig: bpy.types.Object, seen: Look, object_keyed: bool, units: float) -> Parts:
-    """An armature that is no standing body: one part, the topmost bone that goes where most bones go."""
+    """Build the parts of an armature that is no upright body: one part, the topmost bone that moves with most bones."""
     bones = [bone.name for bone in rig.data.bones if bone.use_deform] or seen.bones
     places, _ = in_world(seen, [seen.number(name) for name in bones], units)
     middle = places.mean(axis=1)

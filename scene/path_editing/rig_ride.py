@@ -1,10 +1,10 @@
-"""A rig of any kind carried along: what its controls have to be so that it shows a motion that has been ridden.
+"""Transfer an edited motion to a rig of any kind: the values its controls need to show that motion.
 
-Every part of the body has moved by some rigid motion D(t) from where it was in the source; so has the rig as a whole. A
-control that goes with part o and rides on parts b (its turn) and q (its place) gets, with B its frame at rest and M its
-pose in the source, turn B'^-1 D_o M where B' = D_b B, and place likewise. Where o, b and q are moved alike its channels
-stay as they are, to the last bit: which is why a rig that hangs on one root needs that root alone, and its own path
-changes nothing. No frame is asked of Blender again.
+Every part of the body has moved by a rigid motion D(t) from its place in the source; so has the whole rig. A control of
+part o, with its rotation relative to part b and its place relative to part q, gets the rotation B'^-1 D_o M, where B is
+its rest frame, B' = D_b B, and M is its pose in the source; places likewise. Where o, b and q move alike, its channels
+stay as they are, bit for bit: that is why a rig that hangs on one root needs only that root, and its own path changes
+nothing. Blender evaluates no frame again.
 """
 
 from __future__ import annotations
@@ -23,13 +23,21 @@ from .rig_parts import Parts, in_world, rotations
 
 WHOLE, OBJECT = "whole", "object"
 _SAME = 1e-6
-_STAYS, _LEAST_WAY = 0.5, 1.0  # of the body's way, metres: what falls behind by more does not travel with it
+_STAYS, _LEAST_WAY = 0.5, 1.0  # share of the body's travel, metres: what stays behind further does not travel with it
 
 
 @dataclass(frozen=True)
 class Control:
-    """One control. own, turn, place, axes: the groups with which it goes, on which its turn and its place ride, and
-    along which its location is counted; slides: whether its location is written."""
+    """One control of a rig.
+
+    Attributes:
+        name: of the bone.
+        own: the group that it moves with.
+        turn: the group that its rotation is relative to.
+        place: the group that its place is relative to.
+        axes: the group that gives the axes of its location.
+        slides: whether its location is written.
+    """
 
     name: str
     own: str
@@ -41,8 +49,14 @@ class Control:
 
 @dataclass(frozen=True, eq=False)
 class Moves:
-    """For each group of a rig what carries it from the source to where it is now: x -> turn (x - before) + after,
-    arrays (N, 4), (N, 3), (N, 3) metres."""
+    """The rigid motion of each group from the source to its present place: x -> turn (x - before) + after.
+
+    Attributes:
+        turn: group -> (N, 4) rotations.
+        before: group -> (N, 3) metres.
+        after: group -> (N, 3) metres.
+        known: cache of comparisons.
+    """
 
     turn: dict[str, np.ndarray]
     before: dict[str, np.ndarray]
@@ -50,17 +64,17 @@ class Moves:
     known: dict = field(default_factory=dict)
 
     def point(self, group: str, points: np.ndarray) -> np.ndarray:
-        """Points (N, 3) that go with a group."""
+        """Transform points (N, 3) that move with a group."""
         return quaternion.rotate(self.turn[group], points - self.before[group]) + self.after[group]
 
     def points(self, groups: list[str], points: np.ndarray) -> np.ndarray:
-        """Points (N, C, 3) of which each column goes with its group."""
+        """Transform points (N, C, 3), each column with its group."""
         turn, before, after = (np.stack([table[group] for group in groups], axis=1)
                                for table in (self.turn, self.before, self.after))
         return quaternion.rotate(turn, points - before) + after
 
     def alike(self, one: str, other: str) -> bool:
-        """Whether two groups are carried alike: to a ten-thousandth of a degree and of a millimetre."""
+        """Return whether two groups move alike: to a ten-thousandth of a degree and of a millimetre."""
         if one == other:
             return True
         if (known := self.known.get((one, other))) is None:
@@ -70,7 +84,7 @@ class Moves:
         return known
 
     def between(self, one: str, other: str) -> np.ndarray:
-        """How a group turns (N, 4) within another: what is left of its turn where that of `one` is taken off."""
+        """Compute the rotation (N, 4) of group `other` relative to group `one`."""
         if (known := self.known.get((one, other, "turn"))) is None:
             known = quaternion.multiply(quaternion.inverse(self.turn[one]), self.turn[other])
             self.known[one, other, "turn"] = known
@@ -78,9 +92,10 @@ class Moves:
 
 
 class Rows:
-    """Source frames (N,) of the frames shown, in general fractional, counted from the first that was seen.
+    """Source frames (N,) of the displayed frames, fractional in general, counted from the first sample.
 
-    known: what was taken from tables there, by the name that was given; a path that is dragged asks for the same again.
+    Attributes:
+        known: cache of table values there, by name; a path that is dragged needs the same again.
     """
 
     def __init__(self, at: np.ndarray, count: int):
@@ -93,21 +108,21 @@ class Rows:
         self.same = self.whole and len(at) == count and np.array_equal(self.low, np.arange(count))
 
     def numbers(self, name, table: np.ndarray) -> np.ndarray:
-        """A table (F, ...) of numbers there; name: anything that is its own."""
+        """Interpolate a table (F, ...) of numbers; name: a unique key for the cache."""
         return self.remembered(name, lambda: self._at(table, self._mixed))
 
     def turns(self, name, table: np.ndarray) -> np.ndarray:
-        """A table (F, 4) of rotations there."""
+        """Interpolate a table (F, 4) of rotations; name: a unique key for the cache."""
         return self.remembered(name, lambda: self._at(table, lambda a, b: quaternion.slerp(a, b, self.weight)))
 
     def remembered(self, name, made) -> np.ndarray:
-        """What was made under this name, or what `made` makes."""
+        """Return the cached value of a name, computed by `compute` when missing."""
         if name not in self.known:
             self.known[name] = made()
         return self.known[name]
 
     def _at(self, table: np.ndarray, blend) -> np.ndarray:
-        """A table there; blend(before, after) where it is between two of its rows."""
+        """Select rows of a table; blend(before, after) interpolates between two rows."""
         if self.same:
             return table
         if self.whole:
@@ -120,11 +135,21 @@ class Rows:
 
 
 class Carried:
-    """A rig that has been looked at: what its controls are, and what they have to be."""
+    """A sampled rig, with its controls and the values that they need."""
 
     def __init__(self, rig: bpy.types.Object, parts: Parts, seen: Look, rides: Rides, object_keyed: bool,
                  motion: Motion, units: float):
-        """motion: what the parts show. object_keyed: whether the object itself is animated."""
+        """Sort the controls into groups and tabulate them.
+
+        Args:
+            rig: the armature.
+            parts: its parts.
+            seen: its samples.
+            dependencies: what each control depends on.
+            object_keyed: whether the object itself is animated.
+            motion: the motion that the parts show.
+            units: Blender units in a metre.
+        """
         self.seen, self.parts, self.motion, self.units = seen, parts, motion, units
         self.joint = {part: number for number, part in enumerate(parts.shown)}
         self.places, self.world = forward_kinematics(motion)
@@ -137,18 +162,18 @@ class Carried:
         self.tables = {control.name: self._table(rig, control) for control in self.controls}
 
     def _travels(self, places: np.ndarray) -> bool:
-        """Whether something at places (F, 3) goes where the body goes."""
+        """Return whether something at places (F, 3) travels with the body."""
         way = self.motion.root_positions[:, :2]
         behind = np.ptp(places[:, :2] - way, axis=0).max()
         return bool(behind <= max(_STAYS * np.ptp(way, axis=0).max(), _LEAST_WAY))
 
     def _sorted(self, rig: bpy.types.Object, rides: Rides) -> list[Control]:
-        """All firm controls with their groups."""
+        """List all firm controls with their groups."""
         known = dict(self.group)
         places, _ = in_world(self.seen, [self.seen.number(name) for name in rides.controls], self.units)
 
         def group(number: int, trail: tuple = ()) -> str:
-            """The group of a carrier."""
+            """Find the group of a carrier, following what it depends on."""
             if number == STATIC or number in trail:
                 return OBJECT
             name = rides.carriers[number]
@@ -176,8 +201,10 @@ class Carried:
         return [*found, *self._bent(rig)]
 
     def _bent(self, rig: bpy.types.Object) -> list[Control]:
-        """Bones of legs and arms that inverse kinematics without a pole bends: the solver starts from the bones' own
-        turns, so that the pose that is wanted is set as where it starts."""
+        """List the bones of legs and arms that inverse kinematics without a pole bends.
+
+        The solver starts from the bones' own rotations, so that the target pose is set as its start.
+        """
         found = []
         for bone in rig.pose.bones:
             for one in bone.constraints:
@@ -192,8 +219,11 @@ class Carried:
         return found
 
     def _table(self, rig: bpy.types.Object, control: Control) -> dict[str, np.ndarray]:
-        """Over the source's frames: turn of the control's base and its own (F, 4), its place and its base's (F, 3) m,
-        the what turns metres into its location's units (F, 3, 3), its location (F, 3)."""
+        """Tabulate a control over the source's frames.
+
+        Rotation of its base and its own (F, 4); its place and the place of its zero location (F, 3) m; the matrix from
+        metres to its location's units (F, 3, 3); its location (F, 3).
+        """
         number = self.seen.number(control.name)
         places, turn = in_world(self.seen, [number], self.units)
         own, location = self.seen.own(number), self.seen.channels["location"][:, number]
@@ -209,7 +239,7 @@ class Carried:
                 "rests": rests, "back": np.linalg.inv(axes), "location": location}  # fmt: skip
 
     def _axes(self, rig: bpy.types.Object, name: str, base: np.ndarray) -> np.ndarray:
-        """The directions (F, 3, 3) of a bone's location in the armature's space, as Blender composes poses."""
+        """Compute the axes (F, 3, 3) of a bone's location in the armature's space, as Blender composes poses."""
         bone = rig.data.bones[name]
         if len(rig.pose.bones[name].constraints):
             return quaternion.to_matrix(quaternion.multiply(quaternion.inverse(self.lie[0]), base))
@@ -222,8 +252,16 @@ class Carried:
         return above @ np.linalg.inv(np.array(bone.parent.matrix_local.to_3x3())) @ own
 
     def moves(self, motion: Motion, rigid: Motion, rows: Rows, lies: np.ndarray | None) -> Moves:
-        """What carries each group. motion: as ridden; rigid: the same before leaning and planting; lies (N, 4, 4): the
-        object in the world on the frames shown, None where it stays as in the source's frames."""
+        """Compute the rigid motion of each group.
+
+        Args:
+            motion: the edited motion.
+            rigid: the same before leaning and planting.
+            rows: source frames of the displayed frames.
+            world_matrices: (N, 4, 4) of the object on the displayed frames; None where they are those of the source.
+        Returns:
+            The motion of each group.
+        """
         places, world = forward_kinematics(motion)
         was, had = rows.remembered("source", lambda: self._source_at(rows))
         used = {group for one in self.controls for group in (one.own, one.turn, one.place, one.axes)}
@@ -244,15 +282,21 @@ class Carried:
         return Moves(turn, before, after)
 
     def _source_at(self, rows: Rows) -> tuple[np.ndarray, np.ndarray]:
-        """Places (N, J, 3) and rotations (N, J, 4) of the source's joints in the world."""
+        """Compute places (N, J, 3) and rotations (N, J, 4) of the source's joints in the world."""
         if rows.whole:
             return self.places[rows.low], self.world[rows.low]
         root, local = at_frames(self.motion, rows.at)
         return forward_kinematics(Motion(self.motion.skeleton, root, local, self.motion.fps))
 
     def changed(self, moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
-        """Of each control what has to be other than in the source: (bone, "turn") -> sign-continuous rotations (N, 4)
-        of its own channels, (bone, "location") -> (N, 3)."""
+        """Compute the channels that differ from the source.
+
+        Args:
+            moves: motion of each group.
+            rows: source frames of the displayed frames.
+        Returns:
+            (bone, "turn") -> continuous rotations (N, 4) of its own channels; (bone, "location") -> (N, 3).
+        """
         some = [one for one in self.controls if not all(moves.alike(one.own, other) for other in (one.turn, one.place))]
         return (self._turned(some, moves, rows)
                 | self._slid([one for one in some if one.slides], moves, rows)) if some else {}
@@ -266,17 +310,18 @@ class Carried:
         return {(one.name, "turn"): turned[:, i] for i, one in enumerate(some) if other[i] or one.name in self.held}
 
     def _turns_at(self, some: list[Control], rows: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Turns (N, C, 4) of controls: what takes their bases off, their own, and base and own together."""
+        """Compute rotations (N, C, 4) of controls: the inverse of their base, their own, and base and own together."""
         base, own = (np.stack([rows.turns((one, what), self.tables[one.name][what]) for one in some], axis=1)
                      for what in ("base", "own"))
         return quaternion.inverse(base), own, quaternion.multiply(base, own)
 
     def _slid(self, some: list[Control], moves: Moves, rows: Rows) -> dict[tuple[str, str], np.ndarray]:
+        """Compute the locations (N, 3) of controls with their own location channel."""
         if not some:
             return {}
 
         def all_of(what: str) -> np.ndarray:
-            """A table of all of them: (N, C, ...)."""
+            """Stack a table of all controls: (N, C, ...)."""
             made = lambda: np.stack([rows.numbers((one, what), self.tables[one.name][what]) for one in some],
                                     axis=1)  # noqa: E731
             return rows.remembered((what, *some), made)
@@ -290,8 +335,15 @@ class Carried:
 
 
 def channel_values(mode: str, turned: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """Values (N, n) of a bone's rotation channel in its own mode, of sign-continuous rotations (N, 4); like (n,): the
-    source's first, whose sign and full turns are kept."""
+    """Convert continuous rotations to the values of a bone's rotation channel.
+
+    Args:
+        mode: rotation mode of the bone.
+        turned: (N, 4) continuous rotations.
+        like: (n,) the source's first values, whose sign and full turns are kept.
+    Returns:
+        (N, n) values.
+    """
     values = turned if mode == "QUATERNION" else rotation(mode, turned)
     if mode == "QUATERNION":
         return values if np.sum(values[0] * like) >= 0.0 else -values

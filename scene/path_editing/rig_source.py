@@ -1,4 +1,4 @@
-"""What an armature of any kind plays, looked at once: its motion, and how its rig is carried."""
+"""The motion of an armature of any kind, sampled once, and how it is transferred to its rig."""
 
 from __future__ import annotations
 
@@ -25,13 +25,18 @@ _MOST = 20000  # frames
 
 
 class RigSource:
-    """A rig as it moves.
+    """A rig and the motion it shows.
 
-    motion: what it shows, metres, at the scene's rate; start: the scene frame of its first frame; told: lines for the
-    user."""
+    Attributes:
+        motion: metres, world frame, at the scene's rate.
+        start: scene frame of its first frame.
+        messages: lines for the user.
+    """
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
-        """Looks at every frame of what the rig plays. InputError where it plays nothing, or cannot be carried."""
+        """Sample every frame of the rig's animation. Raises InputError if it plays nothing, or cannot be
+        transferred.
+        """
         played = Played(rig, scene)
         self.rig, self.start, self.played, self.told = rig.name, int(played.frames[0]), played, list(played.told)
         self.units = units_per_metre(scene)
@@ -48,8 +53,16 @@ class RigSource:
                                                 motion=self.motion, units=self.units)
 
     def values(self, ridden, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
-        """(Data path, index) -> values (N,) on the frames from `start` on: what has to be other than in the source,
-        and, where the frames shown are not the source's own, all that is animated."""
+        """Compute the channel values that show an edited motion.
+
+        Args:
+            edited: the `EditedMotion` of the core.
+            rig: the armature.
+        Returns:
+            (data path, index) -> (N,) values from `start` on: all that differ from the source, and all animated
+            channels where
+            other frames than the source's own are displayed.
+        """
         rows, above = self.rows(ridden), self._above(len(ridden.motion), rig)
         moves = self.carried.moves(ridden.motion, ridden.rigid, rows, above @ rows.numbers("basis", self.seen.basis))
         found = {} if rows.same and not self.played.layered else {p: self.own(*p, rows) for p in self.played.places}
@@ -65,17 +78,18 @@ class RigSource:
         return found
 
     def rows(self, ridden) -> Rows:
-        """The source's frames that are shown; the same object as long as they are the same."""
+        """Build the source rows of the displayed frames; the same object while these stay the same."""
         at = np.asarray(ridden.frames, float)
         if self._rows is None or not np.array_equal(at, self._rows.frames):
             self._rows = Rows(at, len(self.motion))
         return self._rows
 
     def own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
-        """A channel's values (N,) in the source on its frames that are shown; None where it was not looked at."""
+        """Sample a channel of the source (N,) at the displayed frames; None if it was not sampled."""
         return rows.remembered((path, index), lambda: self._own(path, index, rows))
 
     def _own(self, path: str, index: int, rows: Rows) -> np.ndarray | None:
+        """Sample a channel of the source from the tables."""
         if (table := self.seen.others.get(path)) is not None:
             table = table[:, min(index, table.shape[1] - 1)]
             steps = np.array_equal(table, np.round(table))
@@ -89,7 +103,7 @@ class RigSource:
         return rows.numbers((path, index, "is"), table[:, index])
 
     def _above(self, count: int, rig: bpy.types.Object) -> np.ndarray:
-        """What the object hangs on, parents and constraints, on the `count` frames from `start` on: (count, 4, 4)."""
+        """Compute the matrices (count, 4, 4) of the object's parents and constraints, from `start` on."""
         if not self._hangs:
             return np.broadcast_to(self._ways[0], (count, 4, 4))
         if count > len(self._ways):
@@ -99,7 +113,7 @@ class RigSource:
         return self._ways[:count]
 
     def _object(self, moves, rows: Rows, above: np.ndarray, rig: bpy.types.Object) -> dict[tuple[str, int], np.ndarray]:
-        """The object's own location and rotation, where it is the object that goes."""
+        """Compute the object's own location and rotation channels where the object itself travels."""
         now = rows.numbers("lies", self.seen.lies).copy()
         now[:, :3, :3] = quaternion.to_matrix(moves.turn[OBJECT]) @ now[:, :3, :3]
         now[:, :3, 3] = moves.point(OBJECT, now[:, :3, 3] / self.units) * self.units
@@ -115,12 +129,21 @@ class RigSource:
 
 
 class Played:
-    """What an armature plays: frames (F,) of the scene; places: (data path, index) of what is animated, of the object
-    and its bones; others: data paths that are not a bone's place or turn; bones: those that are animated; switches:
-    whether other settings are; layered: see `layered`; told."""
+    """The animation of an armature.
+
+    Attributes:
+        frames: (F,) scene frames.
+        places: (data path, index) of all animated channels of object and bones.
+        others: data paths other than a bone's place or rotation.
+        bones: the animated bones.
+        switches: whether further settings are animated.
+        layered: see `is_layered`.
+        object_keyed: whether the object itself is animated.
+        messages: lines for the user.
+    """
 
     def __init__(self, rig: bpy.types.Object, scene: bpy.types.Scene):
-        """InputError where it plays nothing."""
+        """Collect the animation. Raises InputError if the armature plays nothing."""
         self.told: list[str] = []
         found, ends, strips = {}, [], playing_strips(rig)
         for action, slot, extent in [(*channels.playing(rig), None)] + [
@@ -137,9 +160,9 @@ class Played:
         last = int(np.floor(max(b for _, b in ends) + 1e-4))
         if any(_cycles(curve) for curve in found.values()):
             first, last = min(first, scene.frame_start), max(last, scene.frame_end)
-            self.told.append(f"its curves repeat: the motion is what they show from frame {first} to {last}")
+            self.told.append(f"its animation curves repeat: the motion is that of frames {first} to {last}")
         if not 1 <= last - first < _MOST:
-            raise InputError(f"armature {rig.name}", f"a motion of {last - first + 1} frame{'s' * (last > first)}",
+            raise InputError(f"armature {rig.name}", f"has a motion of {last - first + 1} frame{'s' * (last > first)}",
                              f"2 to {_MOST} frames", "key more than one frame")
         self.frames = np.arange(first, last + 1)
         self.layered = layered(rig)
@@ -152,7 +175,7 @@ class Played:
 
 
 def playing_strips(rig: bpy.types.Object, aside: bool = False) -> list:
-    """The NLA strips that play; aside: also while all of them are silent."""
+    """List the NLA strips that play; aside: also while all of them are muted."""
     data = rig.animation_data
     if data is None or not data.use_nla and not aside:
         return []
@@ -162,7 +185,7 @@ def playing_strips(rig: bpy.types.Object, aside: bool = False) -> list:
 
 
 def layered(rig: bpy.types.Object) -> bool:
-    """Whether an armature plays something else than the action on top: strips below it, or a part of it."""
+    """Return whether an armature plays more than its action: strips below it, or only a share of it."""
     data = rig.animation_data
     part = data.action is not None and (data.action_influence != 1.0 or data.action_blend_type != "REPLACE")
     return part or bool(playing_strips(rig))
@@ -173,7 +196,7 @@ def _cycles(curve: bpy.types.FCurve) -> bool:
 
 
 def posed_bone(path: str) -> str | None:
-    """The bone whose place, turn or size a data path is; None for other paths."""
+    """Find the bone whose place, rotation or scale a data path is; None for other paths."""
     match = BONE.match(path)
     return bpy.utils.unescape_identifier(match[1]) if match and match[2] in CHANNELS else None
 
@@ -187,8 +210,10 @@ def _resolves(rig: bpy.types.Object, path: str) -> bool:
 
 
 def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Played) -> list[str]:
-    """The bones that may have to be carried: those that are keyed, and of those of the body, the bones that it follows
-    and those that hang on nothing the ones that move anything."""
+    """List the bones that may have to be written: keyed bones, controls and followers of the body, and free top bones.
+
+    Bones that move nothing visible are left out.
+    """
     driven = _driven(rig)
     top = {bone.name for bone in rig.data.bones if bone.parent is None}
     above = {parts.root, *(b.name for b in rig.data.bones[parts.root].parent_recursive)} if parts.root else set()
@@ -208,6 +233,6 @@ def _controls(rig: bpy.types.Object, side: bpy.types.Scene, parts, played: Playe
 
 
 def _driven(rig: bpy.types.Object) -> set[str]:
-    """Bones whose place or turn a driver sets."""
+    """List the bones whose place or rotation a driver sets."""
     drivers = rig.animation_data.drivers if rig.animation_data is not None else ()
     return {bone for one in drivers if not one.mute and (bone := posed_bone(one.data_path)) is not None}

@@ -1,7 +1,7 @@
-"""Carriers of armatures whose bones do not simply play what they show: control rigs, inverse kinematics, objects that
-move, several bones that travel, NLA strips, modifiers; and which armatures are plain.
+"""Adapters of armatures whose bones do not simply play their keys: control rigs, inverse kinematics, moving objects,
+several travelling bones, NLA strips, modifiers; and the test for plain armatures.
 
-A rig is looked at once, frame by frame (`rig_source`); while a path is dragged all is arithmetic.
+A rig is sampled once, frame by frame (`rig_source`); while a path is dragged everything is arithmetic.
 """
 
 from __future__ import annotations
@@ -27,29 +27,32 @@ from .carrier import MARK, Carrier, PlainCarrier, Read, check_finite, no_motion
 from .rig_source import BONE, RigSource, layered, playing_strips
 
 KIND = "beyond_mocap_ride_kind"
-"""Custom property of a rider's action that is carried as a rig: "rig", or "layers" where it stands for several."""
+"""Custom property of an edited body's action that was written as a rig: "rig", or "layers" where it replaces
+several.
+"""
 
 _STILL = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
 class RigRead(Read):
-    """What was read, with how the rig is carried."""
+    """The motion that was read, with the rig that shows it."""
 
     rig: RigSource | None = None
 
 
 class RigCarrier(Carrier):
-    """An armature of any kind: what it shows is read, and its controls, or its object, are written."""
+    """An armature of any kind: its visible motion is read, and its controls, or its object, are written."""
 
     def check(self) -> None:
         super().check()
         if self.body.type != "ARMATURE" or not len(self.body.data.bones):
-            raise InputError(f"armature {self.body.name}", "no bones", "an armature with bones")
+            raise InputError(f"armature {self.body.name}", "has no bones", "an armature with bones")
         if not self.ride.on and self.source()[0] is None and not playing_strips(self.body):
             raise no_motion(self.body)
 
     def stamp(self, scene: bpy.types.Scene) -> bytes:
+        """Compute a digest of rest pose, rates, rotation modes, constraints and unanimated ancestors."""
         body = self.body
         rest = np.empty(16 * len(body.data.bones), np.float32)
         body.data.bones.foreach_get("matrix_local", rest)
@@ -82,6 +85,9 @@ class RigCarrier(Carrier):
         return RigRead(rig.motion, rig.start, None, tuple(rig.told), rig)
 
     def begin(self) -> None:
+        """Store the original and play an action of ours: a copy of the original, or a new one if several layers
+        play.
+        """
         body, (original, slot) = self.body, self.source()
         several = layered(body)
         put_aside(self.ride.before, body)
@@ -99,17 +105,19 @@ class RigCarrier(Carrier):
         channels.assign(body, made, own)
 
     def write(self, scene: bpy.types.Scene, read: Read, ridden, digest: str) -> None:
+        """Write the controls' channels that differ from the source."""
         made, slot = self.ours()
         rig, (original, own) = read.rig, self.source()
         sources = {} if made[KIND] == "layers" or original is None else channels.curves(original, own)
         sheet = keys.Sheet(made, slot, channels.curves(made, slot), sources)
         wanted = rig.values(ridden, self.body)
         rows = rig.rows(ridden)
-        for place in sheet.curves:  # what was written once and is as in the source again
+        for place in sheet.curves:  # written before, but now equal to the source again
             if place not in wanted and place not in sources and (values := rig.own(*place, rows)) is not None:
                 wanted[place] = values
         if not all(np.isfinite(values).all() for values in wanted.values()):
-            raise InputError("motion on the path", "a pose that is no number", "numbers", "take back the last edit")
+            raise InputError("motion on the path", "a pose with NaN or infinite values", "finite values",
+                             "undo the last edit")
         keys.lay(sheet, read.first, wanted, str(made[MARK]), digest)
         for place in wanted:
             if sheet.curves[place].mute:
@@ -121,14 +129,14 @@ class RigCarrier(Carrier):
         made, slot = self.ours()
         original, own = self.source()
         before = self.ride.before
-        if made[KIND] == "layers":  # what the strips had a share in is in the action: they fall silent
+        if made[KIND] == "layers":  # the action includes the effect of the strips: they are muted
             before.use_nla, before.influence, before.blend, before.extrapolation = False, 1.0, "REPLACE", "HOLD"
         elif original is not None:
             keys.settle(keys.Sheet.of(made, slot, original, own))
         del made[KIND]
 
     def _strips(self) -> list:
-        """The NLA strips that have a share in the original."""
+        """List the NLA strips that contribute to the original."""
         data = self.body.animation_data
         if data is None or self.ride.on and not self.ride.before.use_nla:
             return []
@@ -136,7 +144,7 @@ class RigCarrier(Carrier):
 
     @contextmanager
     def _original(self):
-        """The armature as it was before it rode, for the length of a `with`."""
+        """Restore the original armature for the length of a `with`."""
         body, before = self.body, self.ride.before
         if not self.ride.on:
             yield
@@ -160,12 +168,12 @@ class RigCarrier(Carrier):
 
 
 def carrier_of(body: bpy.types.Object) -> Carrier:
-    """What carries this armature's motion."""
+    """Choose the adapter of an armature."""
     return RigCarrier(body) if rides_as_rig(body) else PlainCarrier(body)
 
 
 def rides_as_rig(body: bpy.types.Object) -> bool:
-    """Whether a `RigCarrier` carries an armature: as it began to ride, or would now."""
+    """Return whether an armature is edited as a rig: as its path edit started, or would now."""
     if body.beyond_mocap_ride.on:
         playing = channels.playing(body)[0]
         return playing is not None and bool(playing.get(KIND))
@@ -173,7 +181,7 @@ def rides_as_rig(body: bpy.types.Object) -> bool:
 
 
 def is_plain(body: bpy.types.Object) -> bool:
-    """Whether an armature shows just what the channels of its bones say, of which the topmost alone travels."""
+    """Return whether an armature shows exactly the channels of its bones, of which only the topmost travels."""
     data = body.animation_data
     if data is None or layered(body) or is_carried(body):
         return False
@@ -205,7 +213,7 @@ def is_plain(body: bpy.types.Object) -> bool:
 
 
 def _out_of_joint(bone: bpy.types.PoseBone, least: float) -> bool:
-    """Whether a bone is elsewhere than its parent puts it, or of another size."""
+    """Return whether a bone is away from where its parent puts it, or of another size."""
     return bone.parent is not None and bone.location.length > least or max(abs(one - 1.0) for one in bone.scale) > 1e-4
 
 

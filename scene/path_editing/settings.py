@@ -1,4 +1,4 @@
-"""What a rider keeps: an armature whose motion rides a curve. Saved with the file, and known to undo."""
+"""The stored state of a path edit: an armature whose motion follows a curve. Saved with the file, and part of undo."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ..result.result import BeyondMocapBefore
 
 
 def follow_pick(ride, context: bpy.types.Context) -> None:
-    """Where a curve is active that nobody rides any more, the one that was picked instead becomes active."""
+    """Make the chosen curve active if the active curve is no longer the path of any armature."""
     active = context.view_layer.objects.active if context.view_layer is not None else None
     if not ride.on or ride.curve is None or context.mode != "OBJECT" or active is None or active.type != "CURVE":
         return
@@ -21,7 +21,7 @@ def follow_pick(ride, context: bpy.types.Context) -> None:
 
 
 def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
-    """Select one object and nothing else, and make it active, so that Tab edits it."""
+    """Select one object only and make it active, so that Tab edits it."""
     if thing.name not in context.view_layer.objects:
         return
     for other in list(context.selected_objects):
@@ -33,30 +33,30 @@ def choose(context: bpy.types.Context, thing: bpy.types.Object) -> None:
 
 @with_settings("path_editing")
 class BeyondMocapRide(bpy.types.PropertyGroup):
-    """One armature's path editing."""
+    """The path edit of one armature."""
 
     attached_to = ("Object.beyond_mocap_ride",)
 
-    on: BoolProperty(name="Rides", description="Whether the armature's motion rides a curve")
+    on: BoolProperty(name="On Path", description="Whether the armature's motion follows a curve")
     curve: PointerProperty(name="New Path", type=bpy.types.Object, poll=lambda _, thing: thing.type == "CURVE",
-                           update=follow_pick, description="The curve object that the motion rides")
-    before: PointerProperty(type=BeyondMocapBefore, description="The original motion, put aside")
+                           update=follow_pick, description="The curve object that the motion follows")
+    before: PointerProperty(type=BeyondMocapBefore, description="The original motion, stored for Revert")
     added: FloatProperty(name="Added", options={"HIDDEN"},
-                         description="Seconds of the delay that keep it apart from others")
+                         description="Seconds of the delay that avoid collisions")
     detours: StringProperty(
         name="Detours", default="[]",
         description="Lateral detours as JSON: [arc in metres, width in metres, offset in metres to the left] each",
     )
     agreed: StringProperty(name="Agreed", options={"HIDDEN"},
-                           description="Digest of what it was when riders were asked to keep apart")
+                           description="Digest of the motion for which collisions were last avoided")
     ground: PointerProperty(name="Ground", type=bpy.types.Object, poll=lambda _, thing: thing.type == "MESH",
-                            description="A mesh whose surface the feet follow; none: the height of the path itself")
-    told: StringProperty(name="Told", options={"HIDDEN"}, description="Lines about what to look at")
+                            description="A mesh whose surface the feet follow; without it, the height of the path")
+    told: StringProperty(name="Messages", options={"HIDDEN"}, description="Status and warnings")
     figures: StringProperty(name="Figures", options={"HIDDEN"}, description="Figures of the result as JSON")
 
 
 def wishes(ride: BeyondMocapRide) -> dict:
-    """The settings as arguments of the core's `RideSettings`."""
+    """Collect the settings as arguments of the core's `PathEditSettings`."""
     from ...beyond_mocap.path_editing.ride import RideSettings
 
     found = property_values(RideSettings, ride, "path_editing")
@@ -69,14 +69,16 @@ def wishes(ride: BeyondMocapRide) -> dict:
 
 
 def riders(scene: bpy.types.Scene) -> list[bpy.types.Object]:
-    """All armatures of a scene that ride."""
+    """List all armatures of a scene that follow a path."""
     if not bpy.data.armatures:
         return []
     return [body for body in scene.objects if body.type == "ARMATURE" and body.beyond_mocap_ride.on]
 
 
 def meant(context: bpy.types.Context) -> list[bpy.types.Object]:
-    """The riders that a button means, the active one first: the selected ones; with a curve active, all who ride it."""
+    """List the edited armatures that a button acts on, the active one first: the selected ones, or all on an active
+    curve.
+    """
     chosen = context.view_layer.objects.active
     if chosen is None:
         return []

@@ -1,1 +1,1 @@
-"""Orders, previews, variants, quality of takes and what is out of date."""
+"""Requests, previews, variants and quality of takes, and what is out of date."""

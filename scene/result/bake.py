@@ -1,4 +1,4 @@
-"""A take becomes objects: armature, action, body, the ball, the track on the ground, and a camera that follows."""
+"""Writing a take to the scene: armature, action, body, ball, the track on the ground, and the camera's motion."""
 
 from __future__ import annotations
 
@@ -19,19 +19,27 @@ from ..stage import ball, body, stage
 
 COLLECTION = "Beyond Mocap"
 BALL = "Ball"
-MARK = "beyond_mocap_take"  # on what was made for a take and may be replaced or taken away by the next one
+MARK = "beyond_mocap_take"  # on datablocks created for a take, which the next one may replace or remove
 
 RIBBON_HEIGHT, RIBBON_WIDTH = 0.015, 0.03  # metres above the ground, half the ribbon's width
 
 
 def frame_at(scene: bpy.types.Scene, seconds: float) -> float:
-    """The (fractional) scene frame at which the tracking file's clock shows `seconds`."""
+    """Compute the (fractional) scene frame of a time `seconds` on the tracking file's clock."""
     settings = scene.beyond_mocap
     return settings.start_frame + (seconds - settings.start_time) * frames_per_second(scene)
 
 
 def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> bpy.types.Object:
-    """Put a take onto the player's armature, making armature and body where there are none that fit; returns it."""
+    """Write a take to the player's armature; creates armature and body if none fits.
+
+    Args:
+        context: for the scene.
+        owner: the player.
+        result: the take with its plan.
+    Returns:
+        The armature.
+    """
     take, scene, settings = made.take, context.scene, context.scene.beyond_mocap
     room = collection(scene)
     target = order.body
@@ -53,7 +61,7 @@ def player(context: bpy.types.Context, order: BeyondMocapPlayer, made: Made) -> 
 
 
 def the_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
-    """Put the ball's way onto the scene's one ball."""
+    """Write the ball's trajectory to the scene's ball."""
     scene = context.scene
     room = collection(scene)
     target = room.objects.get(BALL) or ball.create(context, BALL, room)
@@ -63,7 +71,7 @@ def the_ball(context: bpy.types.Context, path: BallPath) -> bpy.types.Object:
 
 
 def camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
-    """Let the stage's camera, where there is one, follow the middle of all players, smoothly, all of them in view."""
+    """Let the stage's camera follow the middle of all players smoothly, with all of them in view."""
     start = min(take.start_time for take in takes)
     end = max(take.start_time + take.motion.duration for take in takes)
     fps = frames_per_second(scene)
@@ -76,7 +84,7 @@ def camera(scene: bpy.types.Scene, takes: list[Take]) -> None:
 
 
 def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The scene's collection for all that is baked, made where it is missing."""
+    """Find or create the scene's collection for all baked objects."""
     found = scene.collection.children.get(COLLECTION)
     if found is None:
         found = bpy.data.collections.new(COLLECTION)
@@ -85,35 +93,35 @@ def collection(scene: bpy.types.Scene) -> bpy.types.Collection:
 
 
 def ball_of(takes: list[Take], settings: BeyondMocapSettings) -> BallPath | None:
-    """The ball of the first take that has one, if a ball is wanted."""
+    """Find the ball of the first take that has one, if a ball is wanted."""
     return next((take.ball for take in takes if take.ball is not None), None) if settings.make_ball else None
 
 
 def track_name(order: BeyondMocapPlayer) -> str:
-    """The name of the ribbon that shows a player's track."""
+    """Return the name of the ribbon that shows a player's track."""
     return f"{order.name} track"
 
 
 def fits(target: bpy.types.Object, take: Take, scene: bpy.types.Scene) -> bool:
-    """Whether the object is an armature in this scene with the take's bones."""
+    """Return whether the object is an armature in this scene with the take's bones."""
     if target.type != "ARMATURE" or target.name not in scene.objects or not target.data.bones:
         return False
     return armature.skeleton_of(target, scene).same_bones(take.motion.skeleton)
 
 
 def lengthen(scene: bpy.types.Scene, last: float) -> None:
-    """Let the scene's range end no earlier than `last`."""
+    """Extend the scene's frame range to `last`."""
     scene.frame_end = max(scene.frame_end, int(np.floor(last + 1e-4)))
 
 
 def _places(take: Take, seconds: np.ndarray) -> np.ndarray:
-    """Where the player is on the ground at times on the track's clock: (N, 2) metres."""
+    """Interpolate the player's places on the ground at times on the track's clock: (N, 2) metres."""
     times = take.start_time + np.arange(len(take.motion)) / take.motion.fps
     return interpolate(seconds, times, take.motion.root_positions[:, :2])
 
 
 def _smooth(places: np.ndarray, fps: float) -> np.ndarray:
-    """A running mean of (F, n) over two seconds, so that the camera glides."""
+    """Compute the running mean of (F, n) over two seconds, for a smooth camera."""
     half = max(1, int(fps))
     padded = np.concatenate([places[:1].repeat(half, axis=0), places, places[-1:].repeat(half, axis=0)])
     total = np.concatenate([np.zeros((1, places.shape[1])), np.cumsum(padded, axis=0)])
@@ -121,7 +129,7 @@ def _smooth(places: np.ndarray, fps: float) -> np.ndarray:
 
 
 def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb, collection) -> bpy.types.Object:
-    """A ribbon along `points` (N, 2) metres, coloured `rgb`; takes the place of that name's object in `collection`."""
+    """Create a ribbon along points (N, 2) metres, or replace that of the same name in the collection."""
     units = units_per_metre(context.scene)
     data = bpy.data.curves.new(name, "CURVE")
     data.dimensions = "3D"
@@ -131,7 +139,7 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
     placed = np.ones((len(points), 4), np.float32)
     placed[:, :2], placed[:, 2] = np.asarray(points) * units, RIBBON_HEIGHT * units
     line.points.foreach_set("co", placed.ravel())
-    line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side looks up
+    line.points.foreach_set("tilt", np.full(len(points), -np.pi / 2, np.float32))  # its upper side faces up
     data.materials.append(colour(f"{name} colour", tuple(rgb), 0.9))
     ribbon = collection.objects.get(name)
     if ribbon is None or ribbon.type != "CURVE":
@@ -139,7 +147,7 @@ def write_ribbon(context: bpy.types.Context, name: str, points: np.ndarray, rgb,
         collection.objects.link(ribbon)
     else:
         old, ribbon.data = ribbon.data, data
-        if not old.users:  # a preview may have set it aside
+        if not old.users:  # a preview may have stored it
             bpy.data.curves.remove(old)
             data.name = name
     ribbon.hide_select = True

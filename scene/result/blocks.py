@@ -1,8 +1,8 @@
-"""A take's pieces of clips: noted on its action, cut into NLA strips, and strips made one action again.
+"""A take's pieces of clips: noted on its action, cut into NLA strips, and strips joined to one action again.
 
-A strip plays an action of its own that holds the keys of its piece, and one key more on either side where there is
-one, so that whatever curve leads through a seam is the same in both: playing the strips gives the pose that the one
-action gives, at every fraction of a frame.
+A strip plays an action of its own with the keys of its piece, and one more key on either side if there is one, so that
+a curve through a transition is the same in both: playing the strips gives the pose of the single action at every
+fraction of a frame.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ BLOCKS = "beyond_mocap_blocks"  # on an action: its pieces as JSON
 
 @dataclass(frozen=True)
 class Block:
-    """A piece of one clip: from scene frame `start` to `end`, and what is shown."""
+    """A piece of one clip, from scene frame `start` to `end`, with its name."""
 
     start: int
     end: int
@@ -35,17 +35,19 @@ class Block:
 
 
 def note(action: bpy.types.Action, take: Take, scene: bpy.types.Scene) -> None:
-    """Write onto an action which clips its frames show."""
+    """Store on an action which clips its frames show."""
     action[BLOCKS] = json.dumps([[block.start, block.end, block.name] for block in blocks_of(take, scene)])
 
 
 def noted(action: bpy.types.Action) -> tuple[Block, ...]:
-    """The pieces that an action notes; none where it notes nothing."""
+    """Read the pieces stored on an action; none if it has none."""
     return tuple(Block(*row) for row in json.loads(action.get(BLOCKS, "[]")))
 
 
 def blocks_of(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
-    """The pieces of a take in scene frames, seams on the nearest whole frame; shorter ones are left out."""
+    """Compute the pieces of a take in scene frames, with transitions on the nearest whole frame; shorter ones are
+    left out.
+    """
     seams = [0, *(int(seam) for seam in take.seams), len(take.motion)]
     rate = frames_per_second(scene) / take.motion.fps
     first = bake.frame_at(scene, take.start_time)
@@ -59,14 +61,14 @@ def blocks_of(take: Take, scene: bpy.types.Scene) -> tuple[Block, ...]:
 
 
 def name_of(take: Take, frame: int) -> str:
-    """What a strip that begins at a frame of the take is called: clip, and words."""
+    """Build the name of a strip that starts at a frame of the take: clip and labels."""
     clip = take.clips[take.clip[frame]].rpartition("/")[2].removesuffix(".bvh")
     mirrored = " (mirrored)" if take.mirrored[frame] else ""
     return f"{clip}{mirrored} {' '.join(take.words[frame])}".strip()[:60]
 
 
 def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTrack:
-    """Cut the action that `body` plays into strips on its track of ours; the action goes. Returns the track."""
+    """Cut the action of `body` into strips on a track of the extension; the action is removed. Returns the track."""
     whole, slot = channels.playing(body)
     track = track_of(body)
     if whole is None:
@@ -99,13 +101,13 @@ def as_strips(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.NlaTr
 
 
 def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Action | None:
-    """Let `body` play one action: the one that it plays, or its strips of ours put together; the strips go."""
+    """Join the strips of `body` to one action, if it does not play one already; the strips are removed."""
     whole, _ = channels.playing(body)
     track = track_of(body)
     if track is None:
         return whole
     if whole is None:
-        alone = {strip.action: strip.action_slot for strip in track.strips}  # one that was split shows its action twice
+        alone = {strip.action: strip.action_slot for strip in track.strips}  # split strips share one action
         parts = [(action, slot, *noted(action)[0:1]) for action, slot in alone.items()]
         pieces = [(action, slot, block.start, block.end) for action, slot, block in parts]
         whole, slot = channels.joined(pieces, f"{body.name} take", body.name)
@@ -122,13 +124,13 @@ def as_action(body: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Actio
 
 
 def _keep_place(source: bpy.types.Action, made: bpy.types.Action) -> None:
-    """Note on a made action where the body stood when the motion was written."""
+    """Copy the stored place of the body to another action."""
     if PLACED in source:
         made[PLACED] = list(source[PLACED])
 
 
 def track_of(body: bpy.types.Object) -> bpy.types.NlaTrack | None:
-    """The NLA track of `body` that holds our strips; None where there is none."""
+    """Find the NLA track of `body` with strips of the extension; None without one."""
     tracks = body.animation_data.nla_tracks if body.animation_data is not None else ()
     return next((track for track in tracks if track.strips and all(
         strip.action is not None and strip.action.get(MARK) for strip in track.strips)), None)

@@ -1,12 +1,12 @@
-"""What is out of date, said in one place: fingerprints of what a take was made of, against what is asked now.
+"""What is out of date: fingerprints of a take's inputs against the present ones, in one place.
 
-Nothing is worked out while panels are drawn. With a window, a timer looks at one player at a time when something has
-changed (a handler notes that, and whether files have), and writes what it finds beside the file, where undo leaves it
-alone; operators and scripts may ask with `renew`.
+Nothing is computed while panels are drawn. With a window, a timer checks one player at a time when something has
+changed (a handler notes that, and changed files), and writes the result beside the file, where undo ignores it;
+operators and scripts call `update_entry`.
 
-Live has a player updated whose track, words or choices have been edited, once the user's hand has come to rest. That an
-edit matters is found by the same comparison, so that neither the preview itself nor a walk along the timeline starts
-anything. First a quick take is made, and when nothing has changed for a while a whole one in its place.
+Live updates a player whose track, labels or choices have been edited, once the user's pointer is at rest. The same
+comparison decides whether an edit matters, so that neither the preview itself nor playback starts anything. First comes
+a quick take, and when nothing has changed for a while a full one in its place.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ from ..core.live import Watcher, is_playing
 from ..core.settings import BeyondMocapPlayer, absolute
 from . import bake, blocks, hand_keys, plans, queue
 
-SECONDS = 1.0  # between two looks
-LIBRARY_SECONDS = 10.0  # between two looks at the library's folder
-WHOLE = 0.8  # seconds without a change after which a quick take is made as well as it can be
-MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)  # to Live
+SECONDS = 1.0  # between two checks
+LIBRARY_SECONDS = 10.0  # between two checks of the library's folder
+WHOLE = 0.8  # seconds without a change after which a full take replaces a quick one
+MATTERS = (bpy.types.Object, bpy.types.Curve, bpy.types.Action, bpy.types.Scene)  # types that trigger Live
 PLAIN = {"STRING", "INT", "FLOAT", "BOOLEAN", "ENUM"}
-CHANGED = {  # what is told where a part of `parts` is another
-    "words": "its words have changed since",
-    "track": "its track has changed since",
-    "choices": "choices in step 3 have changed since",
-    "library": "the library's files have changed since",
+CHANGED = {  # messages about changed inputs
+    "words": "the labels have changed",
+    "track": "the track has changed",
+    "choices": "settings of step 3 have changed",
+    "library": "the library's files have changed",
 }
 
 _now: dict = {
@@ -50,26 +50,27 @@ _edits: dict = {"looked": 0.0, "quick": {}, "begun": {}}
 
 
 class BeyondMocapStale(bpy.types.PropertyGroup):
-    """What is out of date about one player; its name is the player's."""
+    """What is out of date for one player; its name is the player's."""
 
     scene: IntProperty(description="The scene's session_uid")
-    lines: StringProperty(description="What is out of date, a line each")
-    notes: StringProperty(description="What else there is to know, a line each")
-    mend: StringProperty(description="The operator that mends it; empty where nothing is out of date")
+    lines: StringProperty(description="What is out of date, one line each")
+    notes: StringProperty(description="Further notes, one line each")
+    mend: StringProperty(description="The operator that updates it; empty if nothing is out of date")
 
 
 def fingerprint(value: Any) -> str:
-    """Of plain values, arrays and dataclasses of them: equal for equal content, in every session."""
+    """Compute a fingerprint of plain values, arrays and dataclasses: equal for equal content, in every session."""
     digest = hashlib.blake2b(digest_size=12)
     _feed(digest, value)
     return digest.hexdigest()
 
 
 def _feed(digest, value: Any) -> None:
+    """Feed a value and its structure to a digest."""
     if is_dataclass(value):
         for place in fields(value):
             if place.metadata.get("later") and getattr(value, place.name) == place.default:
-                continue  # files made before there was this choice are not out of date for it
+                continue  # files saved before this setting existed are not out of date because of it
             digest.update(place.name.encode())
             _feed(digest, getattr(value, place.name))
     elif isinstance(value, np.ndarray):
@@ -88,19 +89,28 @@ def _feed(digest, value: Any) -> None:
 
 
 def parts(plan: Plan, folder: str, library: str = "") -> dict[str, str]:
-    """What a take is made of, each by its fingerprint: the track, the words, the other choices, the library on disk
-    (`library`, where its stamp is known)."""
+    """Compute the fingerprints of a take's inputs: track, labels, other settings, and the library on disk.
+
+    Args:
+        plan: of the take.
+        folder: of the library.
+        library: stamp of the library, if it is known.
+    Returns:
+        Fingerprints by name.
+    """
     return {**parts_of_plan(plan), "library": library or library_stamp(folder)}
 
 
 def parts_of_plan(plan: Plan) -> dict[str, str]:
-    """The same without the library, which takes a walk over the disk."""
+    """Compute the same without the library, which needs a walk over the disk."""
     rest = replace(plan, track=None, timeline=Timeline(), library="")
     return {"track": fingerprint(plan.track), "words": fingerprint(plan.timeline), "choices": fingerprint(rest)}
 
 
 def library_stamp(folder: str) -> str:
-    """Of the clips and words of a folder as they lie on disk: their number, size and time, without reading them."""
+    """Compute a fingerprint of the clips and labels of a folder: number, size and time of the files, without reading
+    them.
+    """
     found = []
     for place, folders, names in os.walk(folder, followlinks=True):
         folders[:] = sorted(name for name in folders if not name.startswith("."))
@@ -115,13 +125,13 @@ def library_stamp(folder: str) -> str:
 
 
 def stale(made_of: str, now: dict[str, str]) -> list[str]:
-    """What has changed since: names of `parts` whose fingerprint is another. made_of: JSON as kept on a player."""
+    """List the names of inputs with another fingerprint; made_of: JSON as stored with a player."""
     before = json.loads(made_of or "{}")
     return [name for name in now if before and before.get(name) != now[name]]
 
 
 def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> BeyondMocapStale:
-    """Look at one player, and write what is out of date where the panel finds it."""
+    """Check one player, and store what is out of date for the panel."""
     lines, notes, mend = look(scene, player)
     told = bpy.context.window_manager.beyond_mocap_stale
     entry = next((entry for entry in told if (entry.scene, entry.name) == (scene.session_uid, player.name)), None)
@@ -136,12 +146,19 @@ def renew(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> BeyondMocapStale
 
 
 def look(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[list[str], list[str], str]:
-    """What is out of date, what else there is to know, and the operator that mends it."""
+    """Check what is out of date.
+
+    Args:
+        scene: for the settings.
+        player: the player.
+    Returns:
+        Lines about what is out of date, further notes, and the operator that updates it.
+    """
     if not player.take:
         return [], [], ""
     lines, settings, mend = [], scene.beyond_mocap, "update"
     if session.made(player.take) is None:
-        lines.append("its take is not in this session: Update makes it again, hand-made keys are kept")
+        lines.append("the take is not in this session: Update computes it again and keeps manual keys")
     try:
         plan, _ = plans.plan_of(settings, player, still=True)
         folder = absolute(settings.library_folder)
@@ -159,43 +176,43 @@ def look(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> tuple[list[str], 
 
 
 def _body(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> str:
-    """What is wrong with the body that shows a result."""
+    """Describe what is wrong with the body that shows a result."""
     body, made = player.body, session.made(player.take)
     if body is None or body.name not in scene.objects:
-        return "its body has been deleted: Update makes another"
+        return "the body has been deleted: Update creates another"
     if made is not None and not bake.fits(body, made.take, scene):
-        return "its body's bones have been edited: Update makes another body"
+        return "the body's bones have been edited: Update creates another body"
     if channels.playing(body)[0] is None and blocks.track_of(body) is None:
-        return "its body does not play the result any more: Update shows it again"
+        return "the body no longer plays the result: Update shows it again"
     return ""
 
 
 def _notes(player: BeyondMocapPlayer) -> list[str]:
-    """How many hand-made keys the result carries."""
+    """Describe how many manual keys the result has."""
     body = player.body
     if body is None or player.result.state == "NONE":
         return []
     key = (body.session_uid, player.take, player.result.state)
-    if bpy.app.background or key not in _now["hand"]:  # without a window no handler tells of changes
+    if bpy.app.background or key not in _now["hand"]:  # without a window no handler reports changes
         _now["hand"][key] = len(hand_keys.of_body(body)[0])
     count = _now["hand"][key]
-    keys = "hand-made key" if count == 1 else "hand-made keys"
+    keys = "manual key" if count == 1 else "manual keys"
     return [f"{count} {keys}: kept by Update"] if count else []
 
 
 def dirty(*_) -> None:
-    """Something has changed: look again when there is time."""
+    """Mark that something has changed, for the next check."""
     _now["dirty"] = True
 
 
 def _tick() -> float:
-    """Look at one player, if something has changed and nobody is busy."""
+    """Check one player, if something has changed and no animation plays."""
     scene = bpy.context.scene
     if scene is None or is_playing():
         return SECONDS
     players = scene.beyond_mocap.players
     _look_at_files(scene)
-    if (seen := _seen(scene)) != _now["seen"]:  # settings that a script changes tell no handler
+    if (seen := _seen(scene)) != _now["seen"]:  # no handler reports settings that a script changes
         _now["seen"] = seen
         dirty()
     if _now["dirty"]:
@@ -211,7 +228,7 @@ def _tick() -> float:
 
 
 def _seen(scene: bpy.types.Scene) -> list:
-    """The settings of a scene and its players, as far as they are plain values, and the words that are texts."""
+    """Collect the plain settings of a scene and its players, and the labels in texts."""
     found = []
     for group in (scene.beyond_mocap, *scene.beyond_mocap.players):
         plain = [place for place in group.bl_rna.properties if place.type in PLAIN]
@@ -228,7 +245,7 @@ def _told(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
 
 
 def _look_at_files(scene: bpy.types.Scene) -> None:
-    """Note where tracking, words or library have changed on disk."""
+    """Detect changes of tracking files, label files and the library on disk."""
     settings = scene.beyond_mocap
     paths = {absolute(path) for player in settings.players for path in (player.tracking_file, player.annotation_file)}
     found = {path: _changed_at(path) for path in paths if path}
@@ -257,7 +274,7 @@ def _changed_at(path: str) -> int:
 
 
 def _nothing_runs() -> None:
-    """Whatever was saved with a file that has just been opened; and when the extension is switched off."""
+    """Reset all saved work states after loading a file, and when the extension is disabled."""
     manager = bpy.context.window_manager
     work = manager.beyond_mocap_work
     work.kind = work.waiting = work.trouble = ""
@@ -274,7 +291,7 @@ def _end() -> None:
 
 
 def _after_change(_scene, graph) -> None:
-    """Objects, actions, texts or settings have changed."""
+    """Handle a change of objects, actions, texts or settings."""
     if any(isinstance(update.id, (bpy.types.Action, bpy.types.Object)) for update in graph.updates):
         _now["hand"].clear()
     if len(graph.updates):
@@ -287,8 +304,10 @@ def _after_undo() -> None:
 
 
 def edited_parts(scene: bpy.types.Scene, player) -> dict[str, str]:
-    """What the player asks for, where that is another track, other words or other choices than his newest take was made
-    of; empty where it is not, where he has none, or where what he asks for makes no sense just now."""
+    """Compute the fingerprints of a player's present inputs if they differ from those of the newest take.
+
+    Empty if they are equal, if there is no take, or if the present inputs are invalid.
+    """
     made_of = json.loads(player.result.made_of or "{}")
     if not player.take or not made_of:
         return {}
@@ -300,8 +319,16 @@ def edited_parts(scene: bpy.types.Scene, player) -> dict[str, str]:
 
 
 def due_update(scene: bpy.types.Scene, now: float) -> tuple[str, str] | None:
-    """(player's name, "quick" or "whole") of whoever is to be updated at second `now`; None where nobody is. The same
-    wish is begun once: what was cancelled, undone or cannot be made waits for the next edit."""
+    """Find the player to update, and how.
+
+    Each set of inputs starts one update: after a cancellation, an undo or an error, the next edit starts another.
+
+    Args:
+        scene: with the players.
+        now: seconds.
+    Returns:
+        (player's name, "quick" or "whole"); None if no update is due.
+    """
     players = {player.name: player for player in scene.beyond_mocap.players if player.use}
     if _edits["looked"] != LIVE.since:
         for name, player in players.items():
@@ -319,7 +346,7 @@ def due_update(scene: bpy.types.Scene, now: float) -> tuple[str, str] | None:
 
 
 def update_due(scene: bpy.types.Scene) -> bool:
-    """Have a player updated who is to be, where Live is on; whether one may have to be in a while."""
+    """Start the update that is due if Live is on; returns whether another may become due."""
     if not scene.beyond_mocap.live:
         _edits["quick"].clear()
         return False
@@ -332,7 +359,7 @@ def update_due(scene: bpy.types.Scene) -> bool:
 
 
 def forget_edits() -> None:
-    """No wish is known any more."""
+    """Clear all known inputs."""
     _edits.update(looked=0.0, quick={}, begun={})
 
 
@@ -342,10 +369,10 @@ LIVE = Watcher(name="Live", matters=MATTERS, settle=update_due, ends=forget_edit
 
 
 def register():
-    """What is found is kept beside the file."""
+    """Register the stored results, which are not part of the file."""
     bpy.types.WindowManager.beyond_mocap_stale = bpy.props.CollectionProperty(type=BeyondMocapStale)
 
 
 def unregister():
-    """It is not kept any more."""
+    """Unregister the stored results."""
     del bpy.types.WindowManager.beyond_mocap_stale

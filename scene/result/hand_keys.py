@@ -1,11 +1,11 @@
-"""Keys that a user has set, moved, changed or deleted on a take's action: recognised, and kept when it is made anew.
+"""Manual keys: keys that a user set, moved, changed or deleted on a take's action; detected, and kept when it is
+updated.
 
-An action of ours remembers the values that it was made with, as an array of floats that Blender saves and undoes with
-it. Whatever is otherwise now is the user's: keys of another value, time or interpolation, channels that had none, and
-frames whose key is gone. A key's type alone would not do, since keying a pose over a generated key leaves its type as
-it was; but a key whose type has been changed (R in the dope sheet) counts too, which marks a key as one's own without
-moving it. Of a bone's quaternion all four channels are kept where one of them was changed. A locked channel is kept as
-a whole.
+An action of the extension stores its generated values, as an array of floats that Blender saves and undoes with it.
+Every difference from that is the user's: keys with another value, time or interpolation, channels that had none, and
+frames whose key is missing. A key's type alone would not do, since keying a pose over a generated key leaves its type;
+but a key with a changed type (R in the dope sheet) counts too, which marks a key as manual without moving it. Of a
+bone's quaternion all four channels are kept if one was changed. A locked channel is kept as a whole.
 """
 
 from __future__ import annotations
@@ -29,8 +29,14 @@ Place = tuple[str, int]
 
 @dataclass(frozen=True, eq=False)
 class Made:
-    """What an action was made with: on `count` whole frames from `first` on, a value for each channel; clock: that the
-    frames were counted by, as text."""
+    """The generated keys of an action: values of each channel on `count` whole frames from `first` on.
+
+    Attributes:
+        first: scene frame.
+        count: frames.
+        clock: of the frames, as text.
+        values: (count,) by channel.
+    """
 
     first: int
     count: int
@@ -38,7 +44,7 @@ class Made:
     values: dict[Place, np.ndarray]
 
     def part(self, start: int, end: int) -> "Made":
-        """The frames start to end, both included."""
+        """Select the frames start to end, both included."""
         low, high = max(self.first, start), min(self.first + self.count - 1, end)
         cut = slice(low - self.first, high - self.first + 1)
         return Made(low, high - low + 1, self.clock, {place: values[cut] for place, values in self.values.items()})
@@ -46,8 +52,14 @@ class Made:
 
 @dataclass(frozen=True, eq=False)
 class Hand:
-    """The user's part of an action: per channel its keys (as of `channels.keys_of`) and the whole frames whose key is
-    gone; `whole` the channels that are kept as they are; `like` the curves that they were on."""
+    """The manual keys of an action.
+
+    Attributes:
+        keys: keys by channel, as of `channels.keys_of`.
+        missing: by channel, whole frames whose key is missing.
+        whole: channels that are kept as they are.
+        groups: by channel, name of its group.
+    """
 
     keys: dict[Place, dict[str, np.ndarray]] = field(default_factory=dict)
     gone: dict[Place, np.ndarray] = field(default_factory=dict)
@@ -55,14 +67,14 @@ class Hand:
     groups: dict[Place, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """How many keys: channels of one property on one frame are one."""
+        """Count the keys: channels of one property at one frame are one key."""
         marks = {(place[0], round(float(frame), 3)) for place, keys in self.keys.items() for frame in keys["co"][:, 0]}
         marks |= {(place[0], round(float(frame), 3)) for place, frames in self.gone.items() for frame in frames}
         return len(marks)
 
 
 def note(action: bpy.types.Action, slot, clock: Clock) -> None:
-    """Remember on an action that has just been made what it was made with; all its curves have a key on every frame."""
+    """Store the generated keys of a new action; all its curves have a key on every frame."""
     values = {place: channels.keys_of(curve)["co"] for place, curve in channels.curves(action, slot).items()}
     first = next(iter(values.values()))
     made = {place: co[:, 1] for place, co in values.items()}
@@ -70,14 +82,14 @@ def note(action: bpy.types.Action, slot, clock: Clock) -> None:
 
 
 def write(action: bpy.types.Action, made: Made) -> None:
-    """Put a memory onto an action."""
+    """Write generated keys to an action's properties."""
     places = [list(place) for place in made.values]
     action[FORM] = json.dumps({"first": made.first, "count": made.count, "clock": made.clock, "places": places})
     action[VALUES] = np.concatenate([np.asarray(values, np.float32) for values in made.values.values()])
 
 
 def read(action: bpy.types.Action) -> Made | None:
-    """The memory of an action; None where it has none, or it is damaged."""
+    """Read the generated keys of an action; None if it has none, or if they are damaged."""
     try:
         form = json.loads(action[FORM])
         values = np.frombuffer(action[VALUES], np.float32).reshape(len(form["places"]), form["count"]).copy()
@@ -88,8 +100,9 @@ def read(action: bpy.types.Action) -> Made | None:
 
 
 def joined(parts: list[Made | None]) -> Made | None:
-    """The memory of actions that follow each other, each from the last frame of the one before; None where one has
-    none."""
+    """Join the generated keys of consecutive actions, each from the last frame of the one before; None if one has
+    none.
+    """
     if not parts or any(part is None for part in parts):
         return None
     places = parts[0].values
@@ -99,7 +112,7 @@ def joined(parts: list[Made | None]) -> Made | None:
 
 
 def found(action: bpy.types.Action, slot) -> Hand:
-    """The user's part of an action that remembers what it was made with; nothing where it does not."""
+    """Find the manual keys of an action with stored generated keys; none without these."""
     made = read(action)
     if made is None:
         return Hand()
@@ -124,7 +137,7 @@ def found(action: bpy.types.Action, slot) -> Hand:
 
 
 def put(action: bpy.types.Action, slot, hand: Hand, moved: float = 0.0) -> int:
-    """Let an action that has just been made carry the user's part, `moved` by so many frames; returns how many keys."""
+    """Write manual keys to a new action, shifted by `moved` frames; returns their number."""
     curves = channels.curves(action, slot)
     for place in {*hand.keys, *hand.gone}:
         mine = hand.keys.get(place)
@@ -153,7 +166,7 @@ def put(action: bpy.types.Action, slot, hand: Hand, moved: float = 0.0) -> int:
 
 
 def of_strips(track: bpy.types.NlaTrack) -> Hand:
-    """The user's part of all strips of a track of ours."""
+    """Find the manual keys of all strips of a track."""
     keys, gone, whole, groups = {}, {}, set(), {}
     for strip in track.strips:
         part = found(strip.action, strip.action_slot)
@@ -173,7 +186,7 @@ def of_strips(track: bpy.types.NlaTrack) -> Hand:
 
 
 def of_body(body: bpy.types.Object) -> tuple[Hand, str]:
-    """The user's part of what a body plays, action or strips of ours, and the clock that it was made by."""
+    """Find the manual keys of a body's action or strips, and the clock of these."""
     action, slot = original_of(body)
     made = read(action) if action is not None else None
     if made is not None:
@@ -187,7 +200,7 @@ def of_body(body: bpy.types.Object) -> tuple[Hand, str]:
 
 
 def shift_between(before: str, now: Clock) -> float | None:
-    """Frames by which what was set by the clock `before` (as text) has to move; None where a frame lasts otherwise."""
+    """Compute the frames by which keys of the clock `before` (as text) have to move; None if the frame rates differ."""
     old = Clock.read(before)
     if old is None or abs(old.fps - now.fps) > 1e-6:
         return None
@@ -195,7 +208,7 @@ def shift_between(before: str, now: Clock) -> float | None:
 
 
 def _as_made(curve: bpy.types.FCurve, values: np.ndarray, made: Made) -> bool:
-    """Whether a channel is just as it was made: the usual case, told without reading all that keys have."""
+    """Return whether a channel is unchanged: the usual case, decided without reading all data of the keys."""
     points = curve.keyframe_points
     if len(points) != made.count or _locked(curve):
         return False
@@ -216,7 +229,7 @@ def _locked(curve: bpy.types.FCurve) -> bool:
 
 
 def _changed(keys: dict, values: np.ndarray | None, made: Made) -> np.ndarray:
-    """(n,) bool: which keys of a channel are not as they were made; keys outside what is remembered are no one's."""
+    """Compare keys with generated ones: (n,) bool; keys beyond the generated frames do not count."""
     frames = keys["co"][:, 0]
     if values is None:
         return np.ones(len(frames), bool)
@@ -226,12 +239,12 @@ def _changed(keys: dict, values: np.ndarray | None, made: Made) -> np.ndarray:
     same[inside] = values[at[inside]] == keys["co"][inside, 1]
     same &= np.abs(frames - np.round(frames)) < SAME_FRAME
     same &= (keys["interpolation"] == channels.LINEAR) & (keys["type"] == channels.GENERATED)
-    beyond = ~inside & (keys["type"] == channels.GENERATED)  # a strip's action holds a key or two of its neighbours
+    beyond = ~inside & (keys["type"] == channels.GENERATED)  # a strip's action has a key or two of its neighbours
     return ~same & ~beyond
 
 
 def _together(tables: dict, mine: dict) -> None:
-    """Where one channel of a quaternion is the user's on a frame, so are the others."""
+    """Extend manual keys of one quaternion channel to its other channels at the same frame."""
     for path in {path for path, _ in tables if path.endswith("rotation_quaternion")}:
         places = [place for place in tables if place[0] == path]
         frames = np.concatenate([tables[place]["co"][mine[place], 0] for place in places])
@@ -240,14 +253,14 @@ def _together(tables: dict, mine: dict) -> None:
 
 
 def _missing(frames: np.ndarray, made: Made) -> np.ndarray:
-    """The whole frames that had a key and have none."""
+    """Find the whole frames whose generated key is missing."""
     all_frames = np.arange(made.first, made.first + made.count)
     at = np.round(frames).astype(int)
     return all_frames[~np.isin(all_frames, at[np.abs(frames - at) < SAME_FRAME])].astype(float)
 
 
 def _near(frames: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """(n,) bool: which frames are among others, to a thousandth."""
+    """Find which frames are among others, to a thousandth: (n,) bool."""
     if not len(others):
         return np.zeros(len(frames), bool)
     others = np.sort(others)

@@ -1,4 +1,6 @@
-"""What is to be made for a player: written down on the main thread, worked off in any thread, by plain values only."""
+"""Requests: what to synthesize for a player, built on the main thread and processed in any thread from plain values
+only.
+"""
 
 from __future__ import annotations
 
@@ -17,17 +19,24 @@ from ..core import preferences, session
 from ..core.settings import BeyondMocapPlayer, BeyondMocapSettings, absolute
 from . import freshness, plans, preview
 
-if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and switching on has to be quick
+if TYPE_CHECKING:  # imported by the work itself: scipy and scikit-learn take a second, and enabling must be quick
     from ...beyond_mocap.library.library import Library
 
-LIKE = 0.05  # seconds: ends of stretches nearer than that are the same
+LIKE = 0.05  # seconds: ranges whose ends differ by less are the same
 
 
 @dataclass(frozen=True)
 class How:
-    """What is wanted. kind: "whole" a new take; "update" what has changed since the last; "quick" the same, by a narrow
-    search where it has to be made as a whole, and without figures; "stretch" another solution from second start to end;
-    "variants" as many takes as `count` says, each another solution."""
+    """What to synthesize.
+
+    Attributes:
+        kind: "whole" a new take; "update" what has changed since the last; "quick" the same, by a narrow search if the
+            whole take is needed, and without figures; "stretch" another solution from `start` to `end`; "variants"
+            several takes.
+        start: seconds.
+        end: seconds.
+        count: number of variants.
+    """
 
     kind: str = "whole"
     start: float = 0.0
@@ -37,11 +46,21 @@ class How:
 
 @dataclass(frozen=True)
 class Order:
-    """All that the work for one player needs.
+    """Everything that the work for one player needs.
 
-    where: the place of its words, for messages. warnings: about its track. begin: the name of the take to start from,
-    before: that take, None where this session has not made it. recipe: the steps that led to it, see `recipe`. build:
-    more arguments of the core's `build`."""
+    Attributes:
+        player: name.
+        mode: what to synthesize.
+        plan: of the core.
+        where: source of the labels, for messages.
+        warnings: about the track.
+        begin: name of the take to start from.
+        before: that take; None if the session does not have it.
+        recipe: the steps that led to it.
+        folder: of the library.
+        unit: of the library, metres; None: detected.
+        build: further arguments of the core's `build`.
+    """
 
     player: str
     how: How
@@ -57,14 +76,14 @@ class Order:
 
     @property
     def fingerprint(self) -> str:
-        """Of what is asked for; the player's name is no part of it."""
+        """Fingerprint of the inputs, without the player's name."""
         start = self.begin if self.how.kind != "whole" else ""
         return freshness.fingerprint((self.plan, self.how, start, self.folder, self.unit))
 
 
 @dataclass(frozen=True)
 class One:
-    """A take that was made: its plan, how good it is, and the steps that make it again."""
+    """A take with its plan, its report, and the steps to reproduce it."""
 
     plan: Plan
     take: Take
@@ -74,8 +93,7 @@ class One:
 
 @dataclass(frozen=True)
 class Result:
-    """What the work brings: the library, the parts of the plan that the takes are made of, and the takes (more than one
-    where variants were wanted)."""
+    """The result of a request: the library, the fingerprints of the inputs, and the takes (several for variants)."""
 
     library: "Library"
     made_of: dict
@@ -83,15 +101,26 @@ class Result:
 
 
 def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How, still: bool = False) -> Order:
-    """The order of one player; InputError where something is missing. still: see `drawn_track.read`."""
+    """Build the request of one player.
+
+    Args:
+        settings: of the scene.
+        player: the player.
+        mode: what to synthesize.
+        still: see `drawn_track.read`.
+    Returns:
+        The request.
+    Raises:
+        InputError: if an input is missing.
+    """
     if not settings.library_folder:
-        raise InputError("library", "no folder chosen", "a folder of clips", "choose one in step 1")
+        raise InputError("library", "no folder is chosen", "a folder of clips", "choose one in step 1")
     preview.check(player)
     plan, warnings = plans.plan_of(settings, player, still)
     made = session.made(player.take)
     if how.kind == "stretch" and made is None:
         found = f"no take of {player.name} in this session"
-        raise InputError("a stretch made anew", found, "a take", "press Update first, which makes it again")
+        raise InputError("resynthesize", found, "a take", "press Update first to compute it again")
     folder, unit = absolute(settings.library_folder), settings.library_unit or None
     return Order(player.name, how, plan, where=plans.words_from(player), warnings=warnings, begin=player.take,
                  before=made.take if made else None, recipe=json.loads(player.result.recipe or "{}"), folder=folder,
@@ -99,7 +128,17 @@ def order_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer, how: How,
 
 
 def work(order: Order, library: "Library | None", progress, cancelled, hurry) -> Result:
-    """Make what is ordered, out of the library, which is built where it is None. Never touches bpy."""
+    """Process a request. Never accesses bpy.
+
+    Args:
+        order: the request.
+        library: of clips; None: built first.
+        progress: called with a share and a text.
+        cancelled: returns whether to stop.
+        hurry: returns whether to finish quickly.
+    Returns:
+        The library and the takes.
+    """
     from ...beyond_mocap.library.build import build
 
     clips = library or build(order.folder, unit=order.unit, **order.build, progress=progress,
@@ -115,6 +154,7 @@ def work(order: Order, library: "Library | None", progress, cancelled, hurry) ->
 
 
 def _single(order: Order, clips, progress, cancelled, hurry) -> One:
+    """Synthesize one take by the request's mode."""
     from ...beyond_mocap.synthesis.resynthesize import Anew, resynthesize, shown_footage
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
@@ -137,21 +177,20 @@ def _single(order: Order, clips, progress, cancelled, hurry) -> One:
     else:
         take, steps = synthesize(clips, plan, *asked), [{}]
     recipe = {"plan": stamp, "steps": steps}
-    if how.kind == "quick":  # its figures come with the take that follows
+    if how.kind == "quick":  # its figures come with the full take that follows
         seconds = {**take.seconds, "total": perf_counter() - begun}
         return One(plan, take, {"fps": plan.fps, "seconds": seconds, "warnings": list(take.warnings)}, recipe)
     return _judged(clips, plan, take, recipe, perf_counter() - begun)
 
 
 def _same_span(plan: Plan, before: Take | None) -> bool:
-    """Whether an edit of the take may be made in part: a drawn track that has become longer has to be made as a
-    whole."""
+    """Return whether a take can be updated in part: a drawn track with another duration needs a whole take."""
     old = before.plan.track if before is not None and before.plan is not None else None
     return old is not None and np.array_equal(plan.track.times[[0, -1]], old.times[[0, -1]])
 
 
 def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...]:
-    """The best take and others, each without the footage of those before, or, by the other methods, by another seed."""
+    """Synthesize the best take and others: each without the source frames of those before, or with another seed."""
     from ...beyond_mocap.base.errors import Cancelled
     from ...beyond_mocap.synthesis.resynthesize import shown_footage
     from ...beyond_mocap.synthesis.synthesize import synthesize
@@ -178,7 +217,7 @@ def _variants(order: Order, clips, progress, cancelled, hurry) -> tuple[One, ...
 
 
 def _again(clips, plan: Plan, steps: list[dict], asked) -> Take:
-    """The take that these steps have made before, from nothing: the same bits."""
+    """Reproduce a take from its steps: the same bits."""
     from ...beyond_mocap.synthesis.resynthesize import Anew, resynthesize
     from ...beyond_mocap.synthesis.synthesize import synthesize
 
@@ -196,7 +235,9 @@ def _pieces(step: dict) -> tuple:
 
 
 def _used_before(steps: list[dict] | None, how: How) -> tuple:
-    """What earlier solutions of the same stretch did without, so that pressing again leads on and not back."""
+    """List the source frames that earlier solutions of the same range excluded, so that each press leads to a new
+    one.
+    """
     same = [step for step in steps or () if "start" in step
             and abs(step["start"] - how.start) < LIKE and abs(step["end"] - how.end) < LIKE]
     return tuple(dict.fromkeys(piece for step in same for piece in _pieces(step)))

@@ -1,4 +1,4 @@
-"""What the settings ask for: players, the core's plans, and the seconds that are meant."""
+"""From settings to plans: players, the core's plans, and the selected seconds."""
 
 from __future__ import annotations
 
@@ -18,16 +18,24 @@ from . import blocks
 
 
 def chosen(settings: BeyondMocapSettings) -> list[BeyondMocapPlayer]:
-    """The players that are switched on; InputError where there is none."""
+    """List the players that are switched on. Raises InputError if there is none."""
     players = [player for player in settings.players if player.use]
     if not players:
-        raise InputError("players", "none is ticked", "at least one", "import tracking in step 2 and tick a player")
+        raise InputError("players", "no players are selected", "at least one", "import tracking in step 2")
     return players
 
 
 def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
             still: bool = False) -> tuple[Plan, tuple[str, ...]]:
-    """The plan of one player, and what in the track asks for attention; still: see `drawn_track.read`."""
+    """Build the plan of one player.
+
+    Args:
+        settings: of the scene.
+        player: the player.
+        still: see `drawn_track.read`.
+    Returns:
+        The plan, and warnings about the track.
+    """
     track, found = clean(read_track(settings, player, still))
     plan = Plan(track=track, timeline=timeline_of(player, settings.rate, track),
                 library=absolute(settings.library_folder), pins=pins.read(player.id_data, player),
@@ -36,19 +44,20 @@ def plan_of(settings: BeyondMocapSettings, player: BeyondMocapPlayer,
 
 
 def timeline_of(player: BeyondMocapPlayer, fps: float, track: Track) -> Timeline:
-    """The player's words: from his strips, else from the text of this file, else from the file on disk, else none (all
-    automatic)."""
+    """Read the player's labels: from their strips, else from the text, else from the file, else none (all
+    automatic).
+    """
     asked = strips.read(player, player.id_data)
     return strips.written_words(player, fps, track) if asked is None else asked
 
 
 def words_from(player: BeyondMocapPlayer) -> str:
-    """Where the words that count are written, for messages."""
+    """Describe where the player's labels are written, for messages."""
     return strips.written_in(player) if strips.dot_of(player, player.id_data) is None else strips.where(player)
 
 
 def selected_stretch(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, float]:
-    """Player and seconds on the track's clock; InputError where nothing says which."""
+    """Find the selected player and seconds on the track's clock. Raises InputError without a selection."""
     clock = scene_clock(scene)
     for player in scene.beyond_mocap.players:
         frames = _of_result(player) or _of_words(player, scene)
@@ -57,18 +66,18 @@ def selected_stretch(scene: bpy.types.Scene) -> tuple[BeyondMocapPlayer, float, 
     player = player_shown(scene)
     if player is not None and scene.use_preview_range:
         return player, clock.seconds(scene.frame_preview_start), clock.seconds(scene.frame_preview_end)
-    raise InputError("a stretch made anew", "nothing says which seconds", "a selected strip or a preview range",
+    raise InputError("resynthesize", "no range of time is selected", "a selected strip or a preview range",
                      "select a strip in the NLA editor, or press P in the timeline and draw a range")
 
 
 def player_shown(scene: bpy.types.Scene) -> BeyondMocapPlayer | None:
-    """The active player, where it has a take; else None."""
+    """Find the active player if they have a take; else None."""
     player = active_player(scene.beyond_mocap)
     return player if player is not None and player.take else None
 
 
 def _of_result(player: BeyondMocapPlayer) -> tuple[float, float] | None:
-    """The frames of the selected strips of an accepted result."""
+    """Find the frames of the selected strips of an applied result."""
     track = blocks.track_of(player.body) if player.body is not None else None
     chosen = [strip for strip in track.strips if strip.select] if track is not None and player.body.select_get() else []
     if not chosen or len(chosen) == len(track.strips) > 1:
@@ -77,7 +86,7 @@ def _of_result(player: BeyondMocapPlayer) -> tuple[float, float] | None:
 
 
 def _of_words(player: BeyondMocapPlayer, scene: bpy.types.Scene) -> tuple[float, float] | None:
-    """The frames of the selected spans of words on a player's selected dot."""
+    """Find the frames of the selected label strips of a player's selected dot."""
     dot = strips.dot_of(player, scene)
     if dot is None or not player.take or not dot.select_get():
         return None

@@ -1,7 +1,7 @@
-"""A take shown on its player, to be kept or put away: what was there before is set aside and comes back exactly. Of
-several takes to choose from (variants, named on the player) one is shown.
+"""Previews of takes on their players, to apply or revert: the previous state is stored and restored exactly.
 
-The ball and the stage's camera belong to all players together: they follow the takes that are shown just now.
+Of several takes (variants, named on the player) one is shown. The ball and the stage's camera belong to all players:
+they follow the takes that are shown.
 """
 
 from __future__ import annotations
@@ -27,25 +27,33 @@ VARIANT_LINES = ("quality", "moments", "warnings", "recipe")
 
 
 def check(player: BeyondMocapPlayer) -> None:
-    """InputError where the player's body cannot be animated here."""
+    """Raise InputError if the player's body cannot be animated here."""
     body = player.body
     if body is None:
         return
     channels.check_local(body)
     override = body.override_library
     if override is not None and override.is_system_override:
-        raise InputError(f"body {body.name}", "an override that cannot be edited", "an editable override",
+        raise InputError(f"body {body.name}", "is an override that cannot be edited", "an editable override",
                          "make it editable: Outliner, Library Override, Make")
 
 
 def off_path(player: BeyondMocapPlayer) -> list[str]:
-    """A body that rides a path plays its own motion again, before its result is another; a line about it."""
+    """Revert the path edit of a player's body before its result changes; returns messages."""
     return riders.leave(player.body)
 
 
 def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines: dict[str, str]) -> bpy.types.Object:
-    """Put the session's take of that name onto the player's armature, made where it is missing, and set aside what was
-    there; lines: `quality`, `moments`, `warnings`, `recipe` and `made_of` of the take. Returns the armature."""
+    """Preview a take of the session on the player's armature, created if missing; the previous state is stored.
+
+    Args:
+        context: for the scene.
+        player: the player.
+        take: name of the take.
+        lines: `quality`, `moments`, `warnings`, `recipe` and `made_of` of the take.
+    Returns:
+        The armature.
+    """
     made, result = session.made(take), player.result
     check(player)
     left = off_path(player)
@@ -75,8 +83,10 @@ def show(context: bpy.types.Context, player: BeyondMocapPlayer, take: str, lines
 
 
 def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bpy.types.Object:
-    """Accept what is shown on a player, as one action ("ACTION") or as NLA strips ("STRIPS"); what had been set aside
-    for it and was ours is removed. Returns the armature."""
+    """Apply the preview of a player as one action ("ACTION") or as NLA strips ("STRIPS").
+
+    What had been stored for it and belongs to the extension is removed. Returns the armature.
+    """
     result, body = player.result, player.body
     off_path(player)
     if result.motion.kept and body.animation_data is not None:
@@ -93,7 +103,7 @@ def keep(context: bpy.types.Context, player: BeyondMocapPlayer, form: str) -> bp
 
 
 def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
-    """Take the preview off a player: what was there before is there again, to the last bit."""
+    """Revert the preview of a player: the previous state is restored, bit for bit."""
     result, body = player.result, player.body
     off_path(player)
     accepted = result.was_accepted
@@ -117,25 +127,26 @@ def discard(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 
 
 def shown(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bool:
-    """Whether the player's result is on a body in the scene."""
+    """Return whether the player's result is on a body in the scene."""
     there = player.body is not None and player.body.name in scene.objects
     return there and player.result.state != "NONE"
 
 
 def forget(player: BeyondMocapPlayer) -> None:
-    """The preview's body is gone: nothing can be brought back to it."""
+    """Drop a preview whose body was deleted."""
     _settle(player)
     player.result.state = "NONE"
 
 
 def share(context: bpy.types.Context) -> None:
-    """Let ball and camera follow the takes that are shown; with the last preview what they did before
-    comes back."""
+    """Let ball and camera follow the takes that are shown; after the last preview they return to their previous
+    state.
+    """
     _with_free_ball(context, _share_free)
 
 
 class _shared_length:
-    """Notes, for the length of a `with`, by how much a preview lengthens the scene."""
+    """Records, for the length of a `with`, by how much a preview extends the scene."""
 
     def __init__(self, scene: bpy.types.Scene):
         self.scene, self.shared, self.before = scene, scene.beyond_mocap.shared, scene.frame_end
@@ -152,7 +163,9 @@ class _shared_length:
 
 
 def keep_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, str], dict]]) -> None:
-    """Name the takes of (name, lines, report) on the player, if there are several; what was named before goes."""
+    """Store the takes of (name, lines, report) as variants of the player, if there are several, in place of previous
+    ones.
+    """
     variants = player.result.variants
     variants.clear()
     if len(found) < 2:
@@ -167,14 +180,14 @@ def keep_variants(player: BeyondMocapPlayer, found: list[tuple[str, dict[str, st
 
 
 def show_variant(context: bpy.types.Context, player: BeyondMocapPlayer, number: int) -> None:
-    """Show variant `number`, from 0; InputError where the session does not have it any more."""
+    """Preview variant `number`, from 0. Raises InputError if the session does not have it."""
     variants = player.result.variants
     if not 0 <= number < len(variants):
-        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "make variants first")
+        raise InputError("variant", f"number {number + 1}", f"1 to {len(variants)}", "press Variants first")
     variant = variants[number]
     if session.made(variant.name) is None:
-        found = "not in this session: it was made before the file was opened"
-        raise InputError("variant", found, "variants of this session", "make variants again")
+        found = "is not in this session: it is from before the file was opened"
+        raise InputError("variant", found, "variants of this session", "press Variants again")
     show(context, player, variant.name, {line: getattr(variant, line) for line in VARIANT_LINES})
 
 
@@ -183,7 +196,7 @@ def _keep_shared(context: bpy.types.Context) -> None:
 
 
 def _with_free_ball(context: bpy.types.Context, change) -> None:
-    """Call `change(context)` while nobody carries the ball; who did carries it afterwards too."""
+    """Call `change(context)` while no player holds the ball; possession is restored afterwards."""
     room = context.scene.collection.children.get(bake.COLLECTION)
     ball = room.objects.get(bake.BALL) if room is not None else None
     if ball is None or not len(ball.beyond_mocap_ball.holds):
@@ -192,8 +205,7 @@ def _with_free_ball(context: bpy.types.Context, change) -> None:
 
 
 def _keep_free(context: bpy.types.Context) -> None:
-    """Ball and camera stay with what has been accepted: that is what comes back when previews of others are
-    discarded."""
+    """Let ball and camera stay with applied results: that is the state to which other previews revert."""
     shared, players = context.scene.beyond_mocap.shared, context.scene.beyond_mocap.players
     others, takes = any(player.result.state == "PREVIEW" for player in players), _takes(players, "ACCEPTED")
     if not others or bake.ball_of(takes, context.scene.beyond_mocap) is not None:
@@ -206,7 +218,7 @@ def _keep_free(context: bpy.types.Context) -> None:
 
 
 def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
-    """Plain names for what has been kept, now that what had them before is gone."""
+    """Give applied datablocks their plain names, now that their previous owners are gone."""
     playing = channels.playing(player.body)[0]
     if playing is not None and playing.get(MARK) and playing.library is None:
         playing.name = f"{player.name} take"
@@ -220,6 +232,7 @@ def _name(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 
 
 def _share_free(context: bpy.types.Context) -> None:
+    """Let ball and camera follow the previews, and store their previous state; without previews restore it."""
     scene, settings = context.scene, context.scene.beyond_mocap
     shared = settings.shared
     takes = _takes(settings.players, "ACCEPTED", "PREVIEW")
@@ -241,7 +254,7 @@ def _share_free(context: bpy.types.Context) -> None:
 
 
 def _takes(players, *states: str) -> list:
-    """The takes of players whose result is in one of these states, as far as this session has them."""
+    """List the takes of players whose result is in one of these states, as far as the session has them."""
     found = [session.made(player.take) for player in players if player.result.state in states]
     return [made.take for made in found if made is not None]
 
@@ -256,6 +269,7 @@ def _follow(context: bpy.types.Context, takes: list) -> None:
 
 
 def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
+    """Restore ball, camera and scene length to their state before any preview."""
     if shared.ball.kept and ball is not None:
         if shared.ball.made:
             _remove(ball)
@@ -271,7 +285,7 @@ def _as_before(scene: bpy.types.Scene, shared, ball, focus) -> None:
 
 
 def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: session.Made) -> None:
-    """Note what a preview will take the place of, and set the body's motion aside."""
+    """Store what a preview replaces, and the body's motion."""
     result, body, room = player.result, player.body, bake.collection(context.scene)
     result.was_accepted = result.state == "ACCEPTED"
     result.body = body
@@ -289,7 +303,7 @@ def _remember(context: bpy.types.Context, player: BeyondMocapPlayer, made: sessi
 
 
 def _settle(player: BeyondMocapPlayer) -> None:
-    """Keep nothing of before any more; what was ours and nobody else uses goes."""
+    """Clear the stored previous state; datablocks of the extension that nothing else uses are removed."""
     result = player.result
     drop(result.motion, MARK)
     track, result.track = result.track, None
@@ -301,7 +315,7 @@ def _settle(player: BeyondMocapPlayer) -> None:
 
 
 def _undress(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
-    """Take away the mesh and the track that a preview made, or put back the track that was there."""
+    """Remove the mesh and the track that a preview created, or restore the previous track."""
     result, body = player.result, player.body
     room = bake.collection(context.scene)
     if result.mesh_made and body is not None:
@@ -318,8 +332,7 @@ def _undress(context: bpy.types.Context, player: BeyondMocapPlayer) -> None:
 
 
 def _remove_armature(body: bpy.types.Object) -> None:
-    """Remove an armature that a preview made, with its action; one to which the user has tied things stays, and so does
-    one of another file."""
+    """Remove an armature that a preview created, with its action, unless it has children or belongs to another file."""
     if body.library is not None:
         return
     channels.discard(body, MARK)
@@ -328,7 +341,7 @@ def _remove_armature(body: bpy.types.Object) -> None:
 
 
 def _remove(thing: bpy.types.Object) -> None:
-    """Remove an object of ours, its data and its materials where nobody else uses them."""
+    """Remove an object of the extension, with its data and materials if nothing else uses them."""
     data = thing.data
     channels.discard(thing, MARK)
     bpy.data.objects.remove(thing)
@@ -346,16 +359,16 @@ def _remove_data(data) -> None:
 
 
 def _summary(report: dict, apart: float) -> str:
-    """A take's figures in a few words."""
+    """Describe a take's main figures."""
     root, slide = report["root_error_m"]["mean"], report["skate"]["contact_cm_s"]
-    words = f"slide {slide:.1f} cm/s" if slide is not None else f"off {100 * root:.1f} cm"
+    words = f"slide {slide:.1f} cm/s" if slide is not None else f"track {100 * root:.1f} cm"
     jerk = report.get("seam_jerk_ratio", {}).get("median")
-    words += f", seams {jerk:.2f}" if jerk is not None else ""
-    return f"{words}, {apart:.0%} other" if apart else words
+    words += f", cuts {jerk:.2f}" if jerk is not None else ""
+    return f"{words}, {apart:.0%} different" if apart else words
 
 
 def _apart(first, other) -> float:
-    """The share of frames at which two takes of one plan show different footage."""
+    """Compute the share of frames in which two takes of one plan show different source frames."""
     same_clip = np.array(first.clips)[first.clip] == np.array(other.clips)[other.clip]
     same = same_clip & (first.mirrored == other.mirrored) & (np.abs(first.clip_frame - other.clip_frame) < 3.0)
     return float(1.0 - same.mean())

@@ -1,13 +1,12 @@
-"""A take's figures: as lines that a player's settings keep and the panel draws, columns with a tab between, and as
-animated custom properties of its armature, to be seen in the Graph Editor.
+"""A take's figures: as lines that the player stores and the panel draws, and as animated custom properties.
 
-These lie on the armature's data with an action of their own, so that the body's motion stays what it is and they are
-shown whenever the armature is selected. They belong to the take that is shown.
+These properties are on the armature's data with an action of their own, so that the body's motion is unchanged and they
+show in the Graph Editor whenever the armature is selected. They belong to the displayed take. Columns of the lines are
+separated by tabs:
 
-- quality: name and value ("Feet slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as `evaluation.report`
-  has it)
+- quality: name and value ("Foot slide: 1.2 cm/s"), target, status ("met", "missed" or ""; as in `evaluation.report`)
 - moments: text, seconds, status
-- warnings: text, seconds at which its stretches begin, with blanks between ("" where it is about no time)
+- warnings: text, seconds at which its spans start, separated by blanks ("" without a time)
 """
 
 from __future__ import annotations
@@ -22,40 +21,40 @@ from ..core.measure import frames_per_second, whole_frames
 from ..core.settings import BeyondMocapPlayer
 from . import bake
 
-FIGURES = (  # name, path in the report, factor (a negative one counts from 1), form, unit
-    ("Off track", "root_error_m.mean", 100, "{:.2f}", " cm"),
-    ("Off track, 95 %", "root_error_m.p95", 100, "{:.2f}", " cm"),
-    ("Feet slide", "skate.contact_cm_s", 1, "{:.1f}", " cm/s"),
-    ("Slide a step", "skate.stance_mm_median", 1, "{:.1f}", " mm"),
-    ("Steps over 21 mm", "skate.stances_over_21mm", 100, "{:.1f}", " %"),
-    ("Feet moved", "foot_correction_m.p95", 100, "{:.1f}", " cm"),
-    ("Legs short", "ik_miss_share", 100, "{:.1f}", " %"),
-    ("Hard cuts", "seam_jerk_ratio.share_above_real", 100, "{:.0f}", " %"),
-    ("Hardest cut", "seam_jerk_ratio.max", 1, "{:.2f}", " x"),
-    ("Hardest between", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x"),
-    ("Words met", "annotation_similarity.all", -50, "{:.1f}", " %"),  # -1 is all, +1 none
-    ("Slowest clip", "warp_rate.min", 1, "{:.2f}", " x"),
-    ("Fastest clip", "warp_rate.max", 1, "{:.2f}", " x"),
-    ("Odd poses", "pose_realism", 100, "{:.1f}", " %"),
-    ("Replayed", "loop_share", 100, "{:.1f}", " %"),
+FIGURES = (  # name, key path in the report, factor (a negative one counts from 1), format, unit
+    ("Distance to track", "root_error_m.mean", 100, "{:.2f}", " cm"),
+    ("Distance, 95 %", "root_error_m.p95", 100, "{:.2f}", " cm"),
+    ("Foot slide", "skate.contact_cm_s", 1, "{:.1f}", " cm/s"),
+    ("Slide per step", "skate.stance_mm_median", 1, "{:.1f}", " mm"),
+    ("Steps > 21 mm", "skate.stances_over_21mm", 100, "{:.1f}", " %"),
+    ("Foot correction", "foot_correction_m.p95", 100, "{:.1f}", " cm"),
+    ("Feet out of reach", "ik_miss_share", 100, "{:.1f}", " %"),
+    ("Rough transitions", "seam_jerk_ratio.share_above_real", 100, "{:.0f}", " %"),
+    ("Worst transition", "seam_jerk_ratio.max", 1, "{:.2f}", " x"),
+    ("Worst within clips", "seam_jerk_ratio.rest_max", 1, "{:.2f}", " x"),
+    ("Labels matched", "annotation_similarity.all", -50, "{:.1f}", " %"),  # -1 is all, +1 none
+    ("Lowest playback rate", "warp_rate.min", 1, "{:.2f}", " x"),
+    ("Highest playback rate", "warp_rate.max", 1, "{:.2f}", " x"),
+    ("Unusual poses", "pose_realism", 100, "{:.1f}", " %"),
+    ("Repeated frames", "loop_share", 100, "{:.1f}", " %"),
     ("Lowest point", "ground_mm.min", 1, "{:.1f}", " mm"),
-    ("Time to make", "seconds.total", 1, "{:.1f}", " s"),
+    ("Computing time", "seconds.total", 1, "{:.1f}", " s"),
 )
 ERROR_GROUP, ERROR_MARK = "Beyond Mocap", "beyond_mocap_error_curves"
-CURVES = (  # name, what it says
-    ("Root Error (cm)", "Distance of root and track, both behind 1.5 s; the target is 1.5 cm for 95 %"),
-    ("Slide Left (cm/s)", "Speed over the ground of the left foot while it stands"),
-    ("Slide Right (cm/s)", "Speed over the ground of the right foot while it stands"),
-    ("Correction Left (cm)", "How far polish moved the left foot from where the clips had it"),
-    ("Correction Right (cm)", "How far polish moved the right foot from where the clips had it"),
-    ("Jerk (of real)", "Hardest jerk around, over the 95th percentile of recordings at that speed"),
-    ("Speed Gap (m/s)", "By how much the body is faster than the track asks"),
+CURVES = (  # name, tooltip
+    ("Root Error (cm)", "Distance of root and track, both smoothed over 1.5 s; the target is 1.5 cm for 95 %"),
+    ("Slide Left (cm/s)", "Speed over the ground of the left foot while it is in contact"),
+    ("Slide Right (cm/s)", "Speed over the ground of the right foot while it is in contact"),
+    ("Correction Left (cm)", "Distance by which polishing moved the left foot from its place in the clip"),
+    ("Correction Right (cm)", "Distance by which polishing moved the right foot from its place in the clip"),
+    ("Jerk (of real)", "Highest jerk nearby, over the 95th percentile of recordings at that speed"),
+    ("Speed Gap (m/s)", "Speed of the body above that of the track"),
     ("Piece (0 or 1)", "Changes between 0 and 1 at every cut between two clips"),
 )
 
 
 def quality_lines(report: Mapping) -> str:
-    """A line for each of FIGURES that the report has, with its target and whether that is met."""
+    """Describe each of FIGURES that the report has, with its target and whether that is met."""
     from ...beyond_mocap.evaluation.report import flat
     from ...beyond_mocap.synthesis.quality.targets import target_of
 
@@ -78,17 +77,16 @@ def quality_lines(report: Mapping) -> str:
 
 
 def moment_lines(report: Mapping) -> str:
-    """A line for each key moment: its time, what was asked for, what is shown where that is something else, the clip,
-    and the gap to the ball."""
+    """Describe each key moment: time, labels, what is shown instead, clip, and gap to the ball."""
     from ...beyond_mocap.synthesis.quality.targets import KEY_TARGETS, target_of
 
     lines = []
     for number, key in enumerate(report.get("keys", ()), 1):
         text = f"{key['time_s']:.1f} s  {' '.join(key['labels'])}"
         if key.get("solved_time_s") is not None:
-            text += f", touched at {key['solved_time_s']:.2f} s"
+            text += f", touch at {key['solved_time_s']:.2f} s"
         if key.get("used_instead"):
-            text += f", shown as {' '.join(key['used_instead'])}"
+            text += f", replaced by {' '.join(key['used_instead'])}"
         if key.get("clip"):
             text += f"; {key['clip'].rpartition('/')[2].removesuffix('.bvh')}"
         late, gap = key.get("time_error_s"), key.get("met_gap_m")
@@ -104,7 +102,7 @@ def moment_lines(report: Mapping) -> str:
 
 
 def warning_lines(report: Mapping, more: Iterable[str] = (), known: Iterable[str] = ()) -> str:
-    """A line for each warning of a report, and before them `more` (of the track), but for those that are `known`."""
+    """List the warnings of a report, after `more` (of the track), without those that are `known`."""
     from ...beyond_mocap.base.errors import spans_of
 
     seconds = dict(zip(report.get("warnings", ()), report.get("warning_seconds", ())))
@@ -117,12 +115,12 @@ def warning_lines(report: Mapping, more: Iterable[str] = (), known: Iterable[str
 
 
 def has_error_curves(body: bpy.types.Object | None) -> bool:
-    """Whether an armature has them."""
+    """Return whether an armature has error curves."""
     return body is not None and body.data is not None and any(name in body.data for name, _ in CURVES)
 
 
 def write_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bpy.types.Action | None:
-    """Put the figures of the player's take onto its armature; None where there is no body or take."""
+    """Write the figures of the player's take to its armature; returns None without body or take."""
     made, body = session.made(player.take), player.body
     if made is None or body is None:
         return None
@@ -144,7 +142,7 @@ def write_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> bpy
 
 
 def remove_error_curves(body: bpy.types.Object) -> None:
-    """Take them off an armature, with their action."""
+    """Remove the error curves from an armature, with their action."""
     channels.discard(body.data, ERROR_MARK)
     for name, _ in CURVES:
         if name in body.data:
@@ -152,7 +150,7 @@ def remove_error_curves(body: bpy.types.Object) -> None:
 
 
 def renew_error_curves(scene: bpy.types.Scene, player: BeyondMocapPlayer) -> None:
-    """Where an armature has them, let them be those of the take that the player shows now; without one they go."""
+    """Update an armature's error curves to the displayed take; without a take they are removed."""
     if has_error_curves(player.body) and (not player.take or write_error_curves(scene, player) is None):
         remove_error_curves(player.body)
 
@@ -162,7 +160,7 @@ def _shown(value: float, factor: float) -> float:
 
 
 def _error_values(scene: bpy.types.Scene, made: session.Made) -> np.ndarray:
-    """(C, T) in the order of CURVES; where nothing is known 0, since a key needs a number."""
+    """Compute (C, T) values in the order of CURVES; 0 where unknown, since a key needs a number."""
     from ...beyond_mocap.evaluation.per_frame import per_frame
     from ...beyond_mocap.evaluation.reference import View
     from ...beyond_mocap.synthesis.quality.played import played_from_take

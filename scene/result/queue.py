@@ -1,5 +1,6 @@
-"""What waits to be made: one entry a player, first come, first served; beside the file, so that undo leaves it
-alone."""
+"""The queue of requests: one entry a player, first come, first served; not part of the file, so that undo ignores
+it.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +8,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 _waiting: list["Entry"] = []
-_busy = [False]  # whether somebody works it off
+_busy = [False]  # whether an operator is processing the queue
 
 
 @dataclass(eq=False)
 class Entry:
-    """A player's turn. scene: the scene's session_uid. how: what is to be made, in the words of whoever makes it.
-    order: all that the work needs. fingerprint: of what the player asked for when the order was written; a result of
-    another one is not written. tries: how often it has been ordered."""
+    """A player's place in the queue.
+
+    Attributes:
+        scene: session_uid of the scene.
+        player: name.
+        how: what to synthesize, in the terms of the operator that processes it.
+        order: everything that the work needs.
+        fingerprint: of the player's inputs when the request was created; results for other inputs are dropped.
+        tries: number of requests so far.
+    """
 
     scene: int
     player: str
@@ -25,7 +33,7 @@ class Entry:
 
 
 def add(entry: Entry) -> None:
-    """Let an entry wait at the end; it takes the place of what waited for the same player."""
+    """Add an entry at the end; it replaces a waiting one of the same player."""
     for number, other in enumerate(_waiting):
         if (other.scene, other.player) == (entry.scene, entry.player):
             _waiting[number] = entry
@@ -34,32 +42,32 @@ def add(entry: Entry) -> None:
 
 
 def take() -> Entry | None:
-    """The next one, which waits no longer."""
+    """Remove and return the next entry; None if the queue is empty."""
     return _waiting.pop(0) if _waiting else None
 
 
 def remove(player: str) -> bool:
-    """Let nothing wait for this player any more; whether anything did."""
+    """Remove the entry of this player; returns whether there was one."""
     before = len(_waiting)
     _waiting[:] = [entry for entry in _waiting if entry.player != player]
     return len(_waiting) < before
 
 
 def names() -> list[str]:
-    """The players that wait, in their order."""
+    """List the waiting players in their order."""
     return [entry.player for entry in _waiting]
 
 
 def work(busy: bool) -> None:
-    """Somebody begins, or ends, to work the queue off."""
+    """Mark the queue as being processed, or not."""
     _busy[0] = busy
 
 
 def worked() -> bool:
-    """Whether somebody works it off."""
+    """Return whether the queue is being processed."""
     return _busy[0]
 
 
 def clear() -> None:
-    """Nobody waits any more."""
+    """Remove all entries."""
     _waiting.clear()

@@ -1,1 +1,1 @@
-"""Labels as strips and key moments; the reference video."""
+"""Labels as NLA strips and key moments as markers; the reference video."""

@@ -1,6 +1,6 @@
-"""Annotating by keys in a scene: what the library holds, where the playhead is, and commands carried out on strips.
+"""Annotation by keys: what the library has, where the playhead is, and commands carried out on strips.
 
-The words go to the active player's dot; while a clip with lanes of its own is the active object, to that clip.
+The labels go to the active player's dot; if a clip with label tracks is the active object, to that clip.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from . import lanes, lay_strips, strips, word_checks
 from .lanes import PlacedMoment, PlacedSpan
 
 AT_PLAYHEAD = 0.06
-"""Seconds from the playhead at which a key moment counts as being there, at least a frame."""
+"""Seconds from the playhead within which a key moment counts as there, at least a frame."""
 
 _held: weakref.WeakKeyDictionary = weakref.WeakKeyDictionary()
 
 
 def held(scene: bpy.types.Scene) -> Held | None:
-    """What the library built last from the scene's folder holds; None where none is built."""
+    """Find what the library built from the scene's folder has; None if none is built."""
     settings = scene.beyond_mocap
     library = session.library(absolute(settings.library_folder), settings.library_unit or None)
     if library is None:
@@ -41,16 +41,16 @@ def held(scene: bpy.types.Scene) -> Held | None:
 
 
 def name_of(context: bpy.types.Context) -> str:
-    """Who is annotated, for the eye; empty where there is nobody."""
+    """Describe the target of annotation; empty without one."""
     target, player = strips.timeline_subject(context), active_player(context.scene.beyond_mocap)
     return strips.subject_name(target) if target is not None else player.name if player is not None else ""
 
 
 def now(context: bpy.types.Context) -> Now:
-    """The playhead on the clock of who is annotated; InputError where there is nobody."""
+    """Compute the playhead on the target's clock. Raises InputError without a target."""
     target = strips.timeline_subject(context)
     if target is None and not strips.can_have_timeline(context):
-        raise InputError("annotate", "no player", "a player in the list", "import tracking in step 2 first")
+        raise InputError("annotate", "there is no player", "a player in the list", "import tracking in step 2 first")
     clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
     ends = [placed.span.end for placed in _asked_spans(target)] + [placed.time for placed in _asked_moments(target)]
@@ -58,15 +58,19 @@ def now(context: bpy.types.Context) -> Now:
 
 
 class Done(NamedTuple):
-    """What a command has done. line: for the user; words: whether words changed, and so it is a step for undo."""
+    """The result of a command.
+
+    Attributes:
+        line: for the user.
+        changed_labels: whether labels changed, which makes it an undo step.
+    """
 
     line: str
     words: bool = False
 
 
 def do(context: bpy.types.Context, command: Command) -> Done:
-    """Carry out one command on the strips or the scene. InputError where it cannot be done; nothing has changed
-    then."""
+    """Carry out one command on the strips or the scene. Raises InputError, and changes nothing, if it cannot."""
     done = _done(context, command)
     if done.words:
         word_checks.keep(context)
@@ -74,7 +78,7 @@ def do(context: bpy.types.Context, command: Command) -> Done:
 
 
 def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
-    """Press these keys one after the other with the playhead where it is; returns what was done."""
+    """Simulate pressing these keys with the playhead where it is; returns a line for each command."""
     state, told = annotating.State(held(context.scene)), []
     for key in keys:
         state, commands = annotating.press(state, key, now(context))
@@ -83,6 +87,7 @@ def type_keys(context: bpy.types.Context, keys: list[str]) -> list[str]:
 
 
 def _done(context: bpy.types.Context, command: Command) -> Done:
+    """Run a command by its type."""
     if isinstance(command, AddMoment):
         return Done(_add_moment(context, KeyMoment(command.time, command.words)), True)
     if isinstance(command, AddSpan):
@@ -114,7 +119,7 @@ def _asked_spans(target: bpy.types.Object | None) -> list[PlacedSpan]:
 
 
 def _add_moment(context: bpy.types.Context, key: KeyMoment) -> str:
-    """A key moment; one that stands on its frame already gets its words."""
+    """Add a key moment; one on the same frame gets the new labels instead."""
     target = strips.subject_with_lanes(context)
     clock = strips.subject_clock(context, target)
     there = next((moment for moment in _asked_moments(target) if moment.frame == clock.whole(key.time)), None)
@@ -135,6 +140,7 @@ def _add_span(context: bpy.types.Context, span: Span) -> str:
 
 
 def _at_playhead(context: bpy.types.Context, what: str) -> Done:
+    """Edit the item at the playhead: nudge, mirror or remove it; without a key moment, move the playhead."""
     target = strips.timeline_subject(context)
     clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     found = None if target is None else _found(context, target, clock)
@@ -145,13 +151,12 @@ def _at_playhead(context: bpy.types.Context, what: str) -> Done:
         context.scene.frame_float += step
         return Done(f"{clock.seconds(context.scene.frame_current_final):.2f} s")
     if found is None:
-        raise InputError("playhead", "no key moment or stretch there", f"one to {what}", "go to one first")
+        raise InputError("playhead", "is on no key moment or span", f"one to {what}", "go to one first")
     return Done(_mirror(target, found) if what == "mirror" else _remove(target, found), True)
 
 
 def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
-    """The key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the stretch that is asked for
-    there."""
+    """Find the key moment nearest to the playhead within a frame or AT_PLAYHEAD, else the span there."""
     time = clock.seconds(context.scene.frame_current_final)
     reach = max(AT_PLAYHEAD, 1.0 / clock.fps) + 1e-6
     near = [moment for moment in _asked_moments(target) if abs(moment.time - time) <= reach]
@@ -162,10 +167,11 @@ def _found(context, target, clock: Clock) -> PlacedMoment | PlacedSpan | None:
 
 
 def _mirror(target, found: PlacedMoment | PlacedSpan) -> str:
+    """Swap left and right in the labels of an item."""
     item = found.key if isinstance(found, PlacedMoment) else found.span
     other = replace(item, words=swap_sides(item.words), avoid=swap_sides(item.avoid))
     if other == item:
-        raise InputError(_spoken(item.words), "no side in it", "left or right", "choose one from the menu")
+        raise InputError(_spoken(item.words), "has no side", "left or right", "choose one from the menu")
     if isinstance(found, PlacedMoment):
         lay_strips.change_moment(target, found.strip, found.index, other)
     else:
@@ -188,6 +194,7 @@ def _nudge(context, target, found: PlacedMoment, clock: Clock, step: int) -> str
 
 
 def _next_moment(context: bpy.types.Context, step: int) -> str:
+    """Move the playhead to the next or previous key moment and select it."""
     target = strips.timeline_subject(context)
     clock = scene_clock(context.scene) if target is None else strips.subject_clock(context, target)
     time = clock.seconds(context.scene.frame_current_final)
@@ -201,14 +208,14 @@ def _next_moment(context: bpy.types.Context, step: int) -> str:
 
 
 def _show(context: bpy.types.Context, moment: PlacedMoment, clock: Clock) -> None:
-    """Put the playhead on a key moment: between frames where the scene shows such, else on its marker."""
+    """Put the playhead on a key moment: between frames if the scene shows subframes, else on its marker."""
     scene = context.scene
     frame = clock.frame(moment.time) if scene.show_subframe else float(moment.frame)
     scene.frame_float = frame  # frame_set would leave the movie clip editors behind
 
 
 def _next_player(context: bpy.types.Context, step: int) -> str:
-    """The neighbour in the list becomes active, his dot selected where that can be, so that the NLA editor shows it."""
+    """Make the neighbour in the list active and select their dot if possible, so that the NLA editor shows it."""
     settings = context.scene.beyond_mocap
     if not settings.players:
         return "no player"

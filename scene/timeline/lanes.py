@@ -1,8 +1,8 @@
-"""Timelines as NLA strips: what an object's lanes "Words", "Moments" and "Automatic" say.
+"""Timelines as NLA strips: reading the tracks "Words", "Moments" and "Automatic" of an object.
 
-A span is a strip; a key moment is a pose marker on the action of the long strip in the lane "Moments" (or on a span's
-own). Whatever is done to them with Blender's own tools can be read as it is: see `strip_lines`. The object keeps the
-clock that its frames were written for, so that another frame rate of the scene does not change what they say.
+A span is a strip; a key moment is a pose marker on the action of the long strip in the track "Moments" (or on a span's
+own). Whatever Blender's own tools do to them can be read as it is: see `strip_lines`. The object stores the clock for
+which its frames were written, so that another frame rate of the scene does not change them.
 """
 
 from __future__ import annotations
@@ -22,18 +22,26 @@ WORDS, MOMENTS, AUTOMATIC = "Words", "Moments", "Automatic"
 
 
 class BeyondMocapLanes(bpy.types.PropertyGroup):
-    """What an object with annotations knows about all of them."""
+    """Data that all label strips of an object share."""
 
     attached_to = ("Object.beyond_mocap_lanes",)
-    clock: StringProperty(name="Clock", description="Start frame, seconds there and frames per second of these strips")
+    clock: StringProperty(name="Clock", description="Start frame, its second and the frames per second of these strips")
 
 
 @dataclass(frozen=True)
 class PlacedSpan:
-    """A span and the strip that says it.
+    """A span and its strip.
 
-    track, strip: names. first, last: frames of the strip's ends. off: muted, so that nobody asks for it. automatic:
-    put in by the last synthesis and untouched since."""
+    Attributes:
+        span: the span.
+        track: name of the NLA track.
+        strip: name of the strip.
+        first: frame of the strip's start.
+        last: frame of the strip's end.
+        is_muted: muted, so that it is ignored.
+        is_automatic: added by the last synthesis and unchanged since.
+        is_selected: whether the strip is selected.
+    """
 
     span: Span
     track: str
@@ -47,8 +55,16 @@ class PlacedSpan:
 
 @dataclass(frozen=True)
 class PlacedMoment:
-    """A key moment and the marker that says it: the strip's name, the marker's index on its action, the scene's frame.
-    off: on a muted strip."""
+    """A key moment and its marker.
+
+    Attributes:
+        key: the key moment.
+        strip: name of the strip.
+        index: of the marker on the strip's action.
+        frame: scene frame.
+        is_muted: on a muted strip.
+        is_selected: whether the marker is selected.
+    """
 
     key: KeyMoment
     strip: str
@@ -64,24 +80,31 @@ class PlacedMoment:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What happens."""
+        """The labels of the moment."""
         return self.key.words
 
 
 def has(target: bpy.types.Object) -> bool:
-    """Whether the object has lanes."""
+    """Return whether the object has label tracks."""
     return bool(target.beyond_mocap_lanes.clock) and target.animation_data is not None
 
 
 def written_for(target: bpy.types.Object) -> Clock | None:
-    """The clock whose frames the strips stand on; None where there is none yet."""
+    """Read the clock for which the strips were written; None without one."""
     return Clock.read(target.beyond_mocap_lanes.clock)
 
 
 def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
-    """What the strips ask for; None where the object has no lanes.
+    """Read the timeline of an object's strips.
 
-    where: whose they are, for messages. InputError for a strip or marker whose name is not of the text form."""
+    Args:
+        target: the object.
+        where: whose strips, for messages.
+    Returns:
+        All active spans and key moments; None without label tracks.
+    Raises:
+        InputError: for a strip or marker whose name cannot be parsed.
+    """
     if not has(target):
         return None
     asked = [placed.span for placed in spans(target, where) if not placed.off and not placed.automatic]
@@ -89,9 +112,11 @@ def read(target: bpy.types.Object, where: str = "") -> Timeline | None:
 
 
 def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
-    """All spans by start, those that are off and automatic ones too; InputError as `read`.
+    """List all spans by start, also muted and automatic ones.
 
-    An automatic strip that was moved, renamed, unmuted or put on another lane is asked for from then on."""
+    An automatic strip that was moved, renamed, unmuted or put on another track counts as an ordinary one. Raises
+    InputError as `read_timeline`.
+    """
     clock, where = written_for(target), where or target.name
     found = [placed_span(track, strip, clock, where) for track, strip in strips(target)
              if strip.action.beyond_mocap.kind != "moments"]
@@ -99,7 +124,7 @@ def spans(target: bpy.types.Object, where: str = "") -> list[PlacedSpan]:
 
 
 def placed_span(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip, clock: Clock, where: str) -> PlacedSpan:
-    """One strip's span; InputError as `read`."""
+    """Read the span of one strip. Raises InputError as `read_timeline`."""
     span, made = span_of(strip, clock, where), strip.action.beyond_mocap.kind == "automatic"
     untouched = made and track.name.startswith(AUTOMATIC) and strip.mute and span == recorded_span(strip.action)
     off = (track.mute or strip.mute) and not made
@@ -108,10 +133,11 @@ def placed_span(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip, clock: Clo
 
 
 def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
-    """All key moments by time; InputError as `read`.
+    """List all key moments by time.
 
-    A marker beyond the ends of its strip is not seen and does not count; what several strips show on the same frame,
-    since one is a copy of the other, counts once."""
+    A marker beyond the ends of its strip is ignored; copies on several strips at the same frame count once. Raises
+    InputError as `read_timeline`.
+    """
     clock, where, found = written_for(target), where or target.name, {}
     for track, strip in strips(target):
         for index, marker in enumerate(strip.action.pose_markers):
@@ -127,13 +153,13 @@ def moments(target: bpy.types.Object, where: str = "") -> list[PlacedMoment]:
 
 
 def span_at(target: bpy.types.Object, seconds: float) -> PlacedSpan | None:
-    """The span that is asked for at a time, else the automatic one there, else None."""
+    """Find the active span at a time, else the automatic one there, else None."""
     there = [placed for placed in spans(target) if placed.span.start <= seconds < placed.span.end and not placed.off]
     return min(there, key=lambda placed: (placed.automatic, placed.last - placed.first), default=None)
 
 
 def strips(target: bpy.types.Object) -> Iterator[tuple[bpy.types.NlaTrack, bpy.types.NlaStrip]]:
-    """Every strip of a timeline with its track, those within meta strips too."""
+    """Iterate over the strips of a timeline with their tracks, also within meta strips."""
     data = target.animation_data
     for track in list(data.nla_tracks) if data else ():
         for strip in [inner for top in track.strips for inner in within(top)]:
@@ -142,7 +168,7 @@ def strips(target: bpy.types.Object) -> Iterator[tuple[bpy.types.NlaTrack, bpy.t
 
 
 def within(strip: bpy.types.NlaStrip) -> Iterator[bpy.types.NlaStrip]:
-    """The strip itself, or all strips of a meta strip."""
+    """Iterate over the strip itself, or all strips of a meta strip."""
     if strip.type != "META":
         yield strip
     for inner in strip.strips:
@@ -150,29 +176,29 @@ def within(strip: bpy.types.NlaStrip) -> Iterator[bpy.types.NlaStrip]:
 
 
 def is_lane(track: bpy.types.NlaTrack) -> bool:
-    """Whether what a user puts on this track is meant as words."""
+    """Return whether strips that a user adds to this track are labels."""
     return track.name == MOMENTS or bool(lane_number(track))
 
 
 def lane_number(track: bpy.types.NlaTrack) -> int:
-    """Which lane of words a track is: 1 for "Words", 2 for "Words 2"; 0 for any other track."""
+    """Parse the number of a label track: 1 for "Words", 2 for "Words 2"; 0 for any other track."""
     first, _, number = track.name.partition(" ")
     return 0 if first != WORDS else 1 if not number else int(number) if number.isdecimal() else 0
 
 
 def strip_named(target: bpy.types.Object, name: str) -> bpy.types.NlaStrip:
-    """The strip of that name; InputError where it is gone."""
+    """Find the strip of that name. Raises InputError if there is none."""
     found = next((strip for _, strip in strips(target) if strip.name == name), None)
     if found is None:
-        raise InputError(target.name, f"no strip {name!r}", "a strip of this object", "pick it again")
+        raise InputError(target.name, f"has no strip {name!r}", "a strip of this object", "select it again")
     return found
 
 
 def shows(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> bool:
-    """Whether a marker of its action lies between a strip's ends."""
+    """Return whether a marker of its action is between a strip's ends."""
     return strip.action_frame_start - 0.5 <= marker.frame <= strip.action_frame_end + 0.5
 
 
 def marker_frame(strip: bpy.types.NlaStrip, marker: bpy.types.TimelineMarker) -> int:
-    """The scene frame on which a strip shows a marker of its action."""
+    """Compute the scene frame at which a strip shows a marker of its action."""
     return nearest_frame(strip.frame_start + (marker.frame - strip.action_frame_start) * strip.scale)

@@ -1,6 +1,6 @@
-"""Timelines are written as NLA strips: laid, changed, taken away, and laid anew for another clock.
+"""Writing timelines as NLA strips: created, changed, removed, and moved to another clock.
 
-Each strip has an action of its own without any curve; its manual frame range is the strip's own place in the scene, so
+Each strip has an action of its own without any curves; its manual frame range is the strip's own place in the scene, so
 that a marker's frame on it is the scene's.
 """
 
@@ -18,9 +18,14 @@ from .strip_lines import frames_of, key_of, remember, span_of, tell, words_of
 
 def write(target: bpy.types.Object, timeline: Timeline, clock: Clock,
           extent: tuple[float, float] | None = None) -> None:
-    """Let the strips say `timeline`, in place of all that they asked for; automatic ones stay.
+    """Replace all active strips by a timeline; automatic strips stay.
 
-    extent: seconds over which the lane of key moments goes (the track's ends); it is longer where they need it."""
+    Args:
+        target: the object.
+        timeline: spans and key moments.
+        clock: of its frames.
+        extent: first and last second of the track of key moments (the ends of the tracking data); longer if needed.
+    """
     own(target, clock)
     for track, strip in list(lanes.strips(target)):
         if strip.action.beyond_mocap.kind != "automatic":
@@ -35,8 +40,10 @@ def write(target: bpy.types.Object, timeline: Timeline, clock: Clock,
 
 
 def set_automatic(target: bpy.types.Object, timeline: Timeline, clock: Clock) -> None:
-    """Show what a synthesis put in by itself: those spans of its filled `timeline` that nobody asks for, as muted
-    strips in place of the automatic ones before. What was touched of these is asked for and stays."""
+    """Show the spans that a synthesis added to its filled timeline, as muted strips in place of the previous ones.
+
+    Automatic strips that the user changed are ordinary ones and stay.
+    """
     own(target, clock)
     placed = lanes.spans(target)
     old = {one.strip for one in placed if one.automatic}
@@ -50,7 +57,7 @@ def set_automatic(target: bpy.types.Object, timeline: Timeline, clock: Clock) ->
 
 
 def add_span(target: bpy.types.Object, span: Span, clock: Clock) -> PlacedSpan:
-    """One more span, on the first lane of words that has room; it alone is selected."""
+    """Add a span on the first label track with room, and select only it."""
     own(target, clock)
     strip = _lay(target, span, clock, "span")
     _select_only(target, strip.name)
@@ -58,7 +65,7 @@ def add_span(target: bpy.types.Object, span: Span, clock: Clock) -> PlacedSpan:
 
 
 def add_moment(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> PlacedMoment:
-    """One more key moment, picked; its lane is lengthened where that is too short."""
+    """Add a key moment and select it; its strip is extended if it is too short."""
     own(target, clock)
     strip, index = _mark(target, key, clock)
     pick(target, strip.name, index)
@@ -66,21 +73,21 @@ def add_moment(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> Placed
 
 
 def remove_span(target: bpy.types.Object, strip_name: str) -> None:
-    """Take a span's strip away."""
+    """Remove a span's strip."""
     check_editable(target)
     track = next(track for track, strip in lanes.strips(target) if strip.name == strip_name)
     _take_away(track, lanes.strip_named(target, strip_name))
 
 
 def remove_moment(target: bpy.types.Object, strip_name: str, index: int) -> None:
-    """Take a key moment's marker away."""
+    """Remove a key moment's marker."""
     check_editable(target)
     markers = lanes.strip_named(target, strip_name).action.pose_markers
     markers.remove(markers[index])
 
 
 def change_span(target: bpy.types.Object, strip_name: str, span: Span) -> PlacedSpan:
-    """Let a span say something else or be at another time; an automatic one becomes one that is asked for."""
+    """Change the labels or time of a span; an automatic one becomes an ordinary one."""
     check_editable(target)
     strip, clock = lanes.strip_named(target, strip_name), lanes.written_for(target)
     off = strip.mute and strip.action.beyond_mocap.kind == "span"
@@ -94,7 +101,7 @@ def change_span(target: bpy.types.Object, strip_name: str, span: Span) -> Placed
 
 
 def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: KeyMoment) -> PlacedMoment:
-    """Let a key moment say something else or be at another time; it is picked."""
+    """Change the labels or time of a key moment, and select it."""
     check_editable(target)
     clock, strip = lanes.written_for(target), lanes.strip_named(target, strip_name)
     frame = clock.whole(key.time)
@@ -107,7 +114,7 @@ def change_moment(target: bpy.types.Object, strip_name: str, index: int, key: Ke
 
 
 def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
-    """Let this key moment be the only picked one; an empty name picks none."""
+    """Select only this key moment; an empty name selects none."""
     check_editable(target)
     for _, strip in lanes.strips(target):
         markers = strip.action.pose_markers
@@ -118,7 +125,7 @@ def pick(target: bpy.types.Object, strip_name: str, index: int) -> None:
 
 
 def relay(target: bpy.types.Object, clock: Clock) -> bool:
-    """Lay the strips for another clock, each on the frames of its exact seconds; whether there was anything to do."""
+    """Move the strips to the frames of another clock, by their exact seconds; returns whether anything changed."""
     old = lanes.written_for(target)
     if old is None or old == clock:
         return False
@@ -133,7 +140,7 @@ def relay(target: bpy.types.Object, clock: Clock) -> bool:
             remember(strip, said[strip.name], strip.action.beyond_mocap.kind)
     for strip, marker, key in keys:
         frame = clock.whole(key.time)
-        if strip.action.beyond_mocap.kind == "moments":  # its ends were rounded to coarser frames than the key's
+        if strip.action.beyond_mocap.kind == "moments":  # its ends may be rounded to coarser frames than the key's
             _lengthen(strip, frame, frame)
         tell(marker, key, min(max(frame, int(strip.frame_start)), int(strip.frame_end)))
     target.beyond_mocap_lanes.clock = clock.spelled()
@@ -141,7 +148,7 @@ def relay(target: bpy.types.Object, clock: Clock) -> bool:
 
 
 def own(target: bpy.types.Object, clock: Clock) -> None:
-    """Let the object have lanes on this clock."""
+    """Create an object's label tracks on this clock if needed."""
     check_editable(target)
     target.animation_data_create()
     relay(target, clock)
@@ -153,14 +160,14 @@ def own(target: bpy.types.Object, clock: Clock) -> None:
 
 
 def check_editable(target: bpy.types.Object) -> None:
-    """InputError for an object that another file owns."""
+    """Raise InputError for an object that another file owns."""
     if target.library is not None or target.override_library is not None:
-        found = "it is linked from another file" if target.library else "it is a library override"
+        found = "is linked from another file" if target.library else "is a library override"
         raise InputError(f"object {target.name}", found, "an object of this file", "make it local first")
 
 
 def place(strip: bpy.types.NlaStrip, first: float, last: float) -> None:
-    """Put a strip there at scale 1, its action's range in the same place."""
+    """Place a strip at scale 1, with its action's range at the same frames."""
     strip.action.use_frame_range = True
     strip.action.frame_start, strip.action.frame_end = first, last
     strip.scale, strip.repeat, strip.use_reverse = 1.0, 1.0, False
@@ -187,7 +194,7 @@ def _new_strip(track: bpy.types.NlaTrack, name: str, first: int, last: int) -> b
 
 
 def lane_with_room(target: bpy.types.Object, name: str, first: int, last: int) -> bpy.types.NlaTrack:
-    """The first track of that lane with room from first to last, made where there is none."""
+    """Find the first track of that kind with room from first to last, or create one."""
     tracks = target.animation_data.nla_tracks
     words = name == lanes.WORDS
     fitting = [track for track in tracks if (lanes.lane_number(track) if words else track.name.startswith(name))]
@@ -201,7 +208,7 @@ def lane_with_room(target: bpy.types.Object, name: str, first: int, last: int) -
 
 
 def _mark(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> tuple[bpy.types.NlaStrip, int]:
-    """A new marker for a key moment: its strip and index."""
+    """Create a marker for a key moment; returns its strip and index."""
     frame = clock.whole(key.time)
     strip = _moments_strip(target, frame, frame)
     markers = strip.action.pose_markers
@@ -212,7 +219,7 @@ def _mark(target: bpy.types.Object, key: KeyMoment, clock: Clock) -> tuple[bpy.t
 
 
 def _moments_strip(target: bpy.types.Object, first: int, last: int) -> bpy.types.NlaStrip:
-    """The strip of key moments that goes from first to last: made, or the nearest one lengthened."""
+    """Find the strip of key moments from first to last: created, or the nearest one extended."""
     own_strips = [strip for _, strip in lanes.strips(target) if strip.action.beyond_mocap.kind == "moments"]
     if not own_strips:
         track = target.animation_data.nla_tracks[lanes.MOMENTS]
@@ -226,7 +233,7 @@ def _moments_strip(target: bpy.types.Object, first: int, last: int) -> bpy.types
 
 
 def _lengthen(strip: bpy.types.NlaStrip, first: int, last: int) -> None:
-    """Let a strip reach from first to last at least; its markers stay on their frames."""
+    """Extend a strip to reach from first to last; its markers stay on their frames."""
     start, end = min(strip.frame_start, first), max(strip.frame_end, last)
     if (start, end) == (strip.frame_start, strip.frame_end):
         return
@@ -238,12 +245,12 @@ def _lengthen(strip: bpy.types.NlaStrip, first: int, last: int) -> None:
 
 
 def _on_action(strip: bpy.types.NlaStrip, frame: int) -> int:
-    """The frame of a strip's action that it shows on a frame of the scene."""
+    """Compute the frame of a strip's action that it shows at a scene frame."""
     return nearest_frame(strip.action_frame_start + (frame - strip.frame_start) / strip.scale)
 
 
 def place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
-    """Put all strips of one track in place. They go far away first: one that lands on another would push it."""
+    """Place all strips of one track; they move far away first, since a strip placed on another would push it."""
     wanted = sorted(wanted, key=lambda one: one[0].frame_start)
     far = 1.0 + max((max(strip.frame_end, last) for strip, _, last in wanted), default=0.0)
     for strip, _, _ in reversed(wanted):
@@ -253,7 +260,7 @@ def place_all(wanted: list[tuple[bpy.types.NlaStrip, int, int]]) -> None:
 
 
 def _take_away(track: bpy.types.NlaTrack, strip: bpy.types.NlaStrip) -> None:
-    """Remove a strip (or the meta strip that holds it) and its action, where nobody else plays that."""
+    """Remove a strip (or its meta strip), and its action if nothing else uses that."""
     top = next(top for top in track.strips if strip in list(lanes.within(top)))
     actions = {inner.action for inner in lanes.within(top)}
     track.strips.remove(top)
@@ -270,7 +277,7 @@ def _drop_empty_lanes(target: bpy.types.Object) -> None:
 
 
 def _ends(timeline: Timeline, clock: Clock) -> tuple[float, float]:
-    """First and last second that a timeline speaks of."""
+    """Find the first and last second of a timeline."""
     times = [time for span in timeline.spans for time in (span.start, span.end)] + [key.time for key in timeline.keys]
     return (min(times), max(times)) if times else (clock.start_time, clock.start_time + 1.0)
 

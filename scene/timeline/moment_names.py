@@ -1,6 +1,6 @@
-"""The names of key moments in the NLA editor and the dope sheet, where Blender itself draws ticks only.
+"""The names of key moments in the NLA editor and the dope sheet, where Blender draws only ticks.
 
-The same places serve for drawing and for finding what was clicked, so that nothing is kept between the two.
+The same layout serves for drawing and for finding what was clicked, so that no state is kept in between.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from . import lanes
 from .strips import timeline_subject
 
 TEXT, ROW, PAD, GAP = 11, 18, 5, 4  # points: letters, height of a row, around the text, between two names
-BOTTOM, TOP = 24, 26  # points that stay free for the scroll bar and the frame numbers
+BOTTOM, TOP = 24, 26  # points left free for the scroll bar and the frame numbers
 MOST_ROWS = 5
 INK, PAPER = (0.92, 0.92, 0.92, 1.0), (0.21, 0.21, 0.21, 0.95)
 PICKED_INK, PICKED_PAPER = (0.05, 0.05, 0.05, 1.0), (1.0, 0.62, 0.15, 1.0)
@@ -25,7 +25,20 @@ LINE = (1.0, 0.62, 0.15, 0.35)
 
 @dataclass(frozen=True)
 class Name:
-    """A drawn name: what it says, whose it is, and its box in pixels of the region (left, bottom, right, top)."""
+    """A drawn name.
+
+    Attributes:
+        text: the name.
+        target: name of the object.
+        strip: name of the strip.
+        index: of the marker.
+        frame: scene frame.
+        x: pixels, of the marker.
+        box: left, bottom, right, top, pixels of the region.
+        is_selected: whether the moment is selected.
+        is_muted: whether its strip is muted.
+        has_problem: whether its labels have a problem.
+    """
 
     text: str
     target: str
@@ -40,7 +53,7 @@ class Name:
 
 
 def names(context: bpy.types.Context, region: bpy.types.Region) -> list[Name]:
-    """All names that are to be seen in a region, none over another; the picked one always finds a place."""
+    """Compute all names to draw in a region, without overlaps; the selected one always has a place."""
     import blf
 
     scale = context.preferences.system.ui_scale
@@ -67,7 +80,7 @@ def names(context: bpy.types.Context, region: bpy.types.Region) -> list[Name]:
 
 
 def hit(context: bpy.types.Context, region: bpy.types.Region, x: float, y: float) -> Name | None:
-    """The name at a place of the region in pixels."""
+    """Find the name at a place of the region in pixels."""
     if not shown(context):
         return None
     return next((one for one in names(context, region)
@@ -75,14 +88,14 @@ def hit(context: bpy.types.Context, region: bpy.types.Region, x: float, y: float
 
 
 def shown(context: bpy.types.Context) -> bool:
-    """Whether the names are switched on and this editor has room for them."""
+    """Return whether the names are switched on and this editor has room for them."""
     space = context.space_data
     tiny = getattr(space, "mode", "") == "TIMELINE" or context.region is None or context.region.height < 90
     return context.scene.beyond_mocap.show_moment_names and not tiny
 
 
 def draw():
-    """The draw handler."""
+    """Draw all names; the draw handler."""
     import blf
     import gpu
 
@@ -96,7 +109,7 @@ def draw():
         _rectangle(one.x - 0.5 * scale, one.box[3], one.x + 0.5 * scale, region.height - TOP * scale, LINE)
     for one in found:
         _rectangle(*one.box, PICKED_PAPER if one.picked else WRONG_PAPER if one.wrong else PAPER)
-    for one in found:  # after all boxes, since drawing text ends the blending
+    for one in found:  # after all boxes, since drawing text ends blending
         blf.size(0, TEXT * scale)
         blf.color(0, *(PICKED_INK if one.picked else OFF_INK if one.off else INK))
         blf.position(0, one.box[0] + PAD * scale, one.box[1] + 4.5 * scale, 0)
@@ -105,13 +118,16 @@ def draw():
 
 
 def _rows(region: bpy.types.Region, scale: float) -> int:
-    """How many rows of names fit into the lower half of a region."""
+    """Count the rows of names that fit into the lower half of a region."""
     return max(1, min(MOST_ROWS, int((0.5 * region.height - BOTTOM * scale) / (ROW * scale))))
 
 
 def _moments(context: bpy.types.Context):
-    """(text, (object, strip, index, frame, picked, off)) of the key moments of the active player and of selected dots;
-    names as they are written, since drawing has no time to read words."""
+    """Iterate over (text, (object, strip, index, frame, selected, muted)) of the key moments of the active player and
+    of selected dots.
+
+    Names as they are written, since drawing has no time to parse labels.
+    """
     chosen = {target.name: target for target in context.selected_objects if lanes.has(target)}
     meant = timeline_subject(context)
     if meant is not None:
@@ -136,7 +152,7 @@ def _rectangle(left: float, bottom: float, right: float, top: float, rgba) -> No
 
 
 def redraw() -> None:
-    """Let the editors that show names be drawn again."""
+    """Redraw the editors that show names."""
     window.redraw("NLA_EDITOR", "DOPESHEET_EDITOR")
 
 

@@ -1,8 +1,7 @@
-"""Words that were proposed for a clip, on the armature that shows it: looked through one by one, accepted or refused.
+"""Proposed labels for a clip, on the armature that shows it: reviewed one by one, accepted or refused.
 
-Each is listed with how sure it is and why. One that is accepted becomes an ordinary strip or key moment, which can be
-changed like any; the list remembers who said it, so that it is written with the words as long as nobody has changed
-them.
+Each is listed with its confidence and reason. An accepted proposal becomes an ordinary strip or key moment; the list
+stores its source, which is written with the labels while they stay unchanged.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ if TYPE_CHECKING:
 SAME = 0.1
 """Seconds within which two key moments are the same one."""
 
-STATES = (("OPEN", "Open", "Nobody has looked at it yet"),
-          ("ACCEPTED", "Accepted", "It is among the clip's words"),
-          ("REFUSED", "Refused", "It is not what the clip shows"))
+STATES = (("OPEN", "Open", "Not reviewed yet"),
+          ("ACCEPTED", "Accepted", "Among the clip's labels"),
+          ("REFUSED", "Refused", "Not what the clip shows"))
 
 
 def _go(group, context):
-    """The playhead goes to the proposal that is chosen."""
+    """Move the playhead to the active proposal."""
     target, one = group.id_data, chosen(group.id_data)
     if one is not None and lanes.written_for(target) is not None:
         seconds = (one.start if one.key < 0 else one.key) / target[RATE]
@@ -38,28 +37,35 @@ def _go(group, context):
 
 
 class BeyondMocapProposal(bpy.types.PropertyGroup):
-    """One proposal; `name` is its words. Frames are the recording's own."""
+    """One proposal; `name` is its labels. Frames are the recording's own."""
 
-    start: IntProperty(name="Start", description="First frame of the row")
-    end: IntProperty(name="End", description="Last frame of the row")
-    key: IntProperty(name="Key", default=-1, description="Frame of the key moment; -1 where there is none")
-    confidence: FloatProperty(name="Sure", min=0.0, max=1.0, subtype="FACTOR", description="How sure it is")
-    source: StringProperty(name="Source", description="Who proposes it")
-    why: StringProperty(name="Why", description="What was seen")
-    state: EnumProperty(name="State", items=STATES, description="What became of it")
+    start: IntProperty(name="Start", description="First frame of the proposal")
+    end: IntProperty(name="End", description="Last frame of the proposal")
+    key: IntProperty(name="Key", default=-1, description="Frame of the key moment; -1 without one")
+    confidence: FloatProperty(name="Confidence", min=0.0, max=1.0, subtype="FACTOR", description="Confidence of the "
+                              "proposal")
+    source: StringProperty(name="Source", description="Method or person that proposes it")
+    why: StringProperty(name="Reason", description="Evidence for the proposal")
+    state: EnumProperty(name="State", items=STATES, description="State of the review")
 
 
 class BeyondMocapProposals(bpy.types.PropertyGroup):
-    """What was proposed for the clip that an armature shows."""
+    """The proposals for the clip that an armature shows."""
 
     attached_to = ("Object.beyond_mocap_proposals",)
-    listed: CollectionProperty(type=BeyondMocapProposal, description="By their first frame")
-    active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal that is looked at")
+    listed: CollectionProperty(type=BeyondMocapProposal, description="Proposals by their first frame")
+    active: IntProperty(name="Proposal", min=0, update=_go, description="The proposal under review")
 
 
 def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OPEN", beside: bool = True) -> None:
-    """List proposals in place of those before, the first one chosen. beside: those that were accepted stay listed, as
-    their strips stay."""
+    """List proposals in place of the previous ones, and activate the first.
+
+    Args:
+        target: the armature.
+        found: the proposals.
+        state: of all of them.
+        beside: keep accepted ones in the list, as their strips stay.
+    """
     group = target.beyond_mocap_proposals
     for index in reversed(range(len(group.listed))):
         if not beside or group.listed[index].state != "ACCEPTED":
@@ -72,7 +78,7 @@ def keep(target: bpy.types.Object, found: Iterable["Proposal"], state: str = "OP
 
 def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: float, state: str,
         why: str = "") -> None:
-    """List one more."""
+    """Add one proposal to the list."""
     one = target.beyond_mocap_proposals.listed.add()
     one.name, one.source, one.why = " ".join(row.words), source, why
     one.start, one.end, one.key = int(row.start), int(row.end), -1 if row.key is None else int(row.key)
@@ -80,8 +86,11 @@ def add(target: bpy.types.Object, row: ClipAnnotation, source: str, confidence: 
 
 
 def said_already(told: Timeline, row: ClipAnnotation, fps: float) -> bool:
-    """Whether a timeline has a key moment of the same first word within SAME seconds of a row's key, or a span of the
-    same words over half of a row that has none."""
+    """Return whether a timeline already has the labels of a row.
+
+    That is a key moment with the same first label within SAME_SECONDS seconds of the row's key, or a span with the same
+    labels over half of a row without a key.
+    """
     if row.key is not None:
         return any(key.words[:1] == row.words[:1] and abs(key.time - row.key / fps) <= SAME for key in told.keys)
     start, end = row.start / fps, row.end / fps
@@ -90,18 +99,18 @@ def said_already(told: Timeline, row: ClipAnnotation, fps: float) -> bool:
 
 
 def chosen(target: bpy.types.Object) -> BeyondMocapProposal | None:
-    """The proposal that is looked at; None where nothing is listed."""
+    """Find the active proposal; None if the list is empty."""
     group = target.beyond_mocap_proposals
     return group.listed[group.active] if 0 <= group.active < len(group.listed) else None
 
 
 def row_of(one: BeyondMocapProposal) -> ClipAnnotation:
-    """What a proposal says."""
+    """Convert a proposal to a row of annotation."""
     return ClipAnnotation(one.start, one.end, None if one.key < 0 else one.key, tuple(one.name.split()))
 
 
 def accept(target: bpy.types.Object, index: int) -> str:
-    """Put a proposal among the clip's words; one that was accepted before stays. A line for the user."""
+    """Add a proposal to the clip's labels, unless it was accepted before. Returns a line for the user."""
     from ...beyond_mocap.library.keep_words import as_timeline
 
     one = _at(target, index)
@@ -116,7 +125,7 @@ def accept(target: bpy.types.Object, index: int) -> str:
 
 
 def refuse(target: bpy.types.Object, index: int) -> str:
-    """Leave a proposal out; what it had put among the words is taken away again, where nobody has changed it."""
+    """Refuse a proposal; labels that it had added are removed if they are unchanged. Returns a line for the user."""
     one = _at(target, index)
     if one.state == "ACCEPTED":
         _take_back(target, row_of(one))
@@ -125,8 +134,10 @@ def refuse(target: bpy.types.Object, index: int) -> str:
 
 
 def go_on(target: bpy.types.Object, step: int, only_open: bool = False) -> bool:
-    """Choose the next proposal (step 1) or the one before (-1), of all or of those that nobody has judged; whether
-    there is one. After the last open one the search goes on from the other end."""
+    """Activate the next (step 1) or previous (-1) proposal, of all or of open ones; returns whether there is one.
+
+    After the last open one the search continues from the other end.
+    """
     group = target.beyond_mocap_proposals
     count = len(group.listed)
     if only_open:
@@ -140,12 +151,12 @@ def go_on(target: bpy.types.Object, step: int, only_open: bool = False) -> bool:
 
 
 def left(target: bpy.types.Object) -> int:
-    """Number of proposals that nobody has judged."""
+    """Count the proposals that are still open."""
     return sum(one.state == "OPEN" for one in target.beyond_mocap_proposals.listed)
 
 
 def sources(target: bpy.types.Object) -> "Sources":
-    """Who said the accepted rows."""
+    """Collect the sources of the accepted rows."""
     listed = target.beyond_mocap_proposals.listed
     return {row_of(one): (one.source, one.confidence) for one in listed if one.state == "ACCEPTED"}
 
@@ -153,11 +164,12 @@ def sources(target: bpy.types.Object) -> "Sources":
 def _at(target: bpy.types.Object, index: int) -> BeyondMocapProposal:
     listed = target.beyond_mocap_proposals.listed
     if not 0 <= index < len(listed):
-        raise InputError(target.name, f"no proposal {index}", "one of the list", "press Look Through")
+        raise InputError(target.name, f"has no proposal {index}", "one of the list", "press Look Through")
     return listed[index]
 
 
 def _take_back(target: bpy.types.Object, row: ClipAnnotation) -> None:
+    """Remove the strips and markers with the labels and times of a row."""
     fps = target[RATE]
     if row.key is not None:
         for placed in lanes.moments(target):

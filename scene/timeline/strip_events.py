@@ -1,9 +1,9 @@
-"""What users do to strips with Blender's own tools is put in order: dragged, scaled, split, duplicated, renamed, muted.
+"""Normalize strips after edits by Blender's own tools: dragged, scaled, split, duplicated, renamed, muted.
 
-`lanes` reads strips as they are; here they come back to whole frames, scale 1 and an action of their own, on a lane of
-words, with the line that they now say. In a window this happens by itself a moment after an edit, an undo, a redo or
-the loading of a file; without one, `put_in_order` is there to be called. It makes no undo step: undo brings back what
-the user did or had, and that is put in order again.
+`label_tracks` reads strips as they are; here they return to whole frames, scale 1 and an action of their own, on a
+label track, with the line of their present state. In a window this happens automatically shortly after an edit, an
+undo, a redo or the loading of a file; without a window, call `normalize_strips`. It is no undo step: undo restores the
+state before the user's edit, which is normalized again.
 """
 
 from __future__ import annotations
@@ -21,12 +21,18 @@ from .lay_strips import lane_with_room, place, place_all, relay
 from .strip_lines import base_name, frames_of, key_of, line_of, recorded_span, remember, span_of, tell, words_of
 
 DELAY = 0.1  # seconds after an edit
-UNDER_WAY = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_", "MARKER_OT_")  # what must come to its end first
+UNDER_WAY = ("TRANSFORM_OT_", "NLA_OT_", "ACTION_OT_", "ANIM_OT_", "MARKER_OT_")  # operators that must end first
 
 
 def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
-    """All strips of the scene; those of players are laid anew where the scene's clock has changed. Whether anything
-    was to be done. only: names of the objects that may have changed; all where None."""
+    """Normalize all strips of the scene; those of players move to the scene's clock if it changed.
+
+    Args:
+        scene: with players and their dots.
+        only: names of objects that may have changed; None: all.
+    Returns:
+        Whether anything changed.
+    """
     clock, changed = scene_clock(scene), False
     for player in scene.beyond_mocap.players:
         if player.dot is not None and _ours_to_change(player.dot):
@@ -38,7 +44,7 @@ def put_in_order(scene: bpy.types.Scene, only: set[str] | None = None) -> bool:
 
 
 def _onto_clock(target: bpy.types.Object, clock: Clock) -> bool:
-    """Lay strips anew for a clock; where one of them cannot be read they wait, as they are, until it is renamed."""
+    """Move strips to a clock; if one of them cannot be read, they stay until it is renamed."""
     try:
         return has(target) and relay(target, clock)
     except InputError:
@@ -46,7 +52,7 @@ def _onto_clock(target: bpy.types.Object, clock: Clock) -> bool:
 
 
 def tidy(target: bpy.types.Object) -> bool:
-    """The strips of one object; whether anything was to be done. A name that is no words is left as it is."""
+    """Normalize the strips of one object; returns whether anything changed. Names that cannot be parsed stay."""
     clock, changed = written_for(target), _name_lanes(target)
     for track, strip in _outermost(target):
         if strip.action.beyond_mocap.kind == "moments":
@@ -64,21 +70,21 @@ def tidy(target: bpy.types.Object) -> bool:
 
 
 def _outermost(target: bpy.types.Object) -> list:
-    """(track, strip) of a timeline but for those within meta strips, where no strip can be put elsewhere."""
+    """List (track, strip) of a timeline without those within meta strips, which cannot be moved to another track."""
     within = [inner for track in target.animation_data.nla_tracks for top in track.strips if top.type == "META"
               for inner in top.strips]
     return [(track, strip) for track, strip in strips(target) if not within or strip not in within]
 
 
 def _ours_to_change(target: bpy.types.Object) -> bool:
-    """Whether the object may be changed just now: not another file's, and not while one of its strips is edited."""
+    """Return whether the object may be changed now: not linked, and none of its strips in tweak mode."""
     data = target.animation_data
     mine = target.library is None and target.override_library is None
     return mine and not (data is not None and data.use_tweak_mode)
 
 
 def _name_lanes(target: bpy.types.Object) -> bool:
-    """Tracks that Blender made for duplicates of our spans become lanes of words."""
+    """Turn tracks that Blender created for duplicated spans into label tracks."""
     tracks, changed = target.animation_data.nla_tracks, False
     for track in tracks:
         kinds = {strip.action.beyond_mocap.kind if strip.action else "none" for strip in track.strips}
@@ -90,7 +96,7 @@ def _name_lanes(target: bpy.types.Object) -> bool:
 
 
 def _out_of_order(track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -> bool:
-    """Whether a span's strip has to have another action: it says something else, or shares the one that it has."""
+    """Return whether a span's strip needs another action: its line changed, or its action is shared."""
     action = strip.action
     own = action.users - action.use_fake_user == 1
     if not own or recorded_span(action) != span or base_name(strip.name) != base_name(action.beyond_mocap.shown):
@@ -100,8 +106,9 @@ def _out_of_order(track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) ->
 
 
 def _renew(target, track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -> None:
-    """Give a strip an action of its own with what it says now and the markers that it shows; a touched automatic one is
-    asked for from now on."""
+    """Give a strip an action of its own with its present line and visible markers; a changed automatic strip becomes an
+    ordinary one.
+    """
     old, touched = strip.action, strip.action.beyond_mocap.kind == "automatic"
     keys = _shown_keys(strip, clock, target.name)
     new = bpy.data.actions.new(f"{target.name} {words_of(span)}")
@@ -120,7 +127,7 @@ def _renew(target, track, strip: bpy.types.NlaStrip, span: Span, clock: Clock) -
 
 
 def _move(target, track, strip: bpy.types.NlaStrip) -> None:
-    """Put a strip onto a lane of words with room; tracks cannot hand over strips, so it is made again there."""
+    """Move a strip to a label track with room; it is created again, since tracks cannot exchange strips."""
     first, last, action = strip.frame_start, strip.frame_end, strip.action
     selected, muted = strip.select, strip.mute
     lane = lane_with_room(target, WORDS, int(first), int(last))
@@ -132,7 +139,7 @@ def _move(target, track, strip: bpy.types.NlaStrip) -> None:
 
 
 def _onto_frames(target: bpy.types.Object, clock: Clock) -> bool:
-    """Strips onto the whole frames of their spans at scale 1; what would then lie on another one takes another lane."""
+    """Align strips with the whole frames of their spans at scale 1; overlapping ones move to another track."""
     changed = False
     for track in list(target.animation_data.nla_tracks):
         wanted, evicted, reached = [], [], None
@@ -160,7 +167,7 @@ def _in_place(strip: bpy.types.NlaStrip, first: int, last: int) -> bool:
 
 
 def _tidy_moments(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> bool:
-    """The lane of key moments at scale 1 in its own frames; a shared or moved action is replaced, see `lanes`."""
+    """Normalize the strip of key moments: scale 1 in its own frames; a shared or moved action is replaced."""
     action = strip.action
     first, last = round(strip.frame_start), max(round(strip.frame_end), round(strip.frame_start) + 1)
     own = action.users - action.use_fake_user == 1
@@ -186,7 +193,7 @@ def _tidy_moments(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> bool:
 
 
 def _tidy_markers(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> bool:
-    """Markers that were moved, renamed or added keep the line that they now say."""
+    """Store the present line of markers that were moved, renamed or added."""
     changed = False
     for marker in strip.action.pose_markers:
         try:
@@ -201,7 +208,7 @@ def _tidy_markers(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> bool:
 
 
 def _shown_keys(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> list:
-    """(key moment, whether it is picked) of each marker that a strip shows."""
+    """List (key moment, whether it is selected) of each visible marker of a strip."""
     return [(key_of(marker, marker_frame(strip, marker), clock, where), marker.select)
             for marker in strip.action.pose_markers if shows(strip, marker)]
 
@@ -212,8 +219,7 @@ def _drop(action: bpy.types.Action) -> None:
 
 
 def _soon(names: set[str] | None) -> None:
-    """Put the strips of these objects (None: all) in order a moment later; without a window nothing happens by
-    itself."""
+    """Schedule the strips of these objects (None: all) for normalization; does nothing without a window."""
     global _waiting
     if bpy.app.background:
         return
@@ -222,7 +228,7 @@ def _soon(names: set[str] | None) -> None:
 
 
 def _later():
-    """The timer: waits while the user is still dragging."""
+    """Run the scheduled work; the timer waits while the user is still dragging."""
     global _waiting
     if is_running(UNDER_WAY):
         return DELAY
@@ -234,7 +240,7 @@ def _later():
 
 
 def _changed(_scene, depsgraph) -> None:
-    """An object with lanes, one of our actions or the scene's clock may have changed."""
+    """Schedule objects whose label tracks, actions or clock may have changed."""
     names, wanted = set(), False
     for update in depsgraph.updates:
         thing = update.id.original
@@ -248,14 +254,14 @@ def _changed(_scene, depsgraph) -> None:
 
 
 def _other_clock(scene: bpy.types.Scene) -> bool:
-    """Whether a player's strips stand on the frames of another clock than the scene's."""
+    """Return whether a player's strips use another clock than the scene's."""
     clock = scene_clock(scene).spelled()
     return any(player.dot is not None and player.dot.beyond_mocap_lanes.clock not in ("", clock)
                for player in scene.beyond_mocap.players)
 
 
 def _restored() -> None:
-    """Undo, redo or a file has brought back strips as they were."""
+    """Schedule everything after undo, redo or loading a file."""
     _soon(None)
 
 

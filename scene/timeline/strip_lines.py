@@ -1,8 +1,8 @@
-"""What one strip or one marker says, as a line of the text form, and the exact line that is kept beside it.
+"""The label line of one strip or marker, and the exact line that is stored beside it.
 
-A strip's or marker's name is the words of its line. The line itself is kept in a record (`action.beyond_mocap`,
-`marker.beyond_mocap`): as long as an end or a marker stands on the frame that the line asks for, the line's second
-counts, else the frame's; as long as the name is the one that was given, the line's words count, else the name's.
+The name of a strip or marker is its labels. The line itself is stored in a record (`action.beyond_mocap`,
+`marker.beyond_mocap`): while an end or a marker is on the frame of that line, the line's exact second counts, else that
+of the frame; while the name is the stored one, the line's labels count, else those of the name.
 """
 
 from __future__ import annotations
@@ -18,46 +18,46 @@ from ...beyond_mocap.annotation import KeyMoment, Span, Timeline, format_timelin
 from ...beyond_mocap.base.errors import InputError
 from ..core.measure import Clock, nearest_frame
 
-NO_WORDS = "(automatic)"  # the name of a span that says nothing: a strip's name cannot be empty
-KINDS = (("none", "None", "Nothing of a timeline"),
-         ("span", "Span", "A stretch that is asked for"),
-         ("automatic", "Automatic", "A stretch that a synthesis put in"),
-         ("moments", "Moments", "The lane of key moments"),
+NO_WORDS = "(automatic)"  # the name of a span without labels: a strip's name cannot be empty
+KINDS = (("none", "None", "Not part of a timeline"),
+         ("span", "Span", "A span with labels"),
+         ("automatic", "Automatic", "A span added by a synthesis"),
+         ("moments", "Moments", "The NLA track of key moments"),
          ("moment", "Moment", "A key moment"))
-KEPT = 8192  # lines that are remembered as read: all of a match, since strips are read after every edit
-_MOST_BLANKS = 24
-_NEAR = 1.0 - 1e-3  # frames; what was moved by less still stands where its line says
+KEPT = 8192  # lines in the cache: all of a match, since strips are read after every edit
+_MOST_BLANKS = 24  # blanks added to a strip's name to make it unique
+_NEAR = 1.0 - 1e-3  # frames; after a smaller move the time of the line still holds
 
 
 class BeyondMocapLine(bpy.types.PropertyGroup):
-    """What an action or a marker was written for. Times are text: Blender's own numbers are too coarse for them."""
+    """The stored line of an action or marker. Times are text, since Blender's floats are too coarse for them."""
 
     attached_to = ("Action.beyond_mocap", "TimelineMarker.beyond_mocap")
-    kind: EnumProperty(name="Kind", items=KINDS, description="What this stands for in a timeline")
+    kind: EnumProperty(name="Kind", items=KINDS, description="Role of this item in a timeline")
     line: StringProperty(name="Line", description="The exact line of the text form, in seconds")
-    shown: StringProperty(name="Shown", description="The name that Blender gave it then; another one means new words")
+    shown: StringProperty(name="Shown", description="Its name when it was written; another name means new labels")
 
 
 def frames_of(span: Span, clock: Clock) -> tuple[int, int]:
-    """First and last whole frame of a span's strip; at least one frame long, so that it can be seen."""
+    """Compute the first and last whole frame of a span's strip; at least one frame long, so that it is visible."""
     first = clock.whole(span.start)
     return first, max(first + 1, clock.whole(span.end))
 
 
 @lru_cache(maxsize=KEPT)
 def line_of(item: Span | KeyMoment) -> str:
-    """The line of the text form that says this, exactly."""
+    """Format a span or key moment as a line of the text form, exactly."""
     timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
     return format_timeline(timeline).strip()
 
 
 def words_of(item: Span | KeyMoment) -> str:
-    """The words of its line: the name of its strip or marker."""
+    """Format the labels of a span or key moment: the name of its strip or marker."""
     return " ".join(line_of(item).split()[2 if isinstance(item, Span) else 1 :]) or NO_WORDS
 
 
 def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
-    """The stretch that a strip stands for, whatever was done to it; InputError where its name is not of the form."""
+    """Read the span of a strip in its present state. Raises InputError if its name cannot be parsed."""
     record = strip.action.beyond_mocap
     first = nearest_frame(strip.frame_start)
     last = max(nearest_frame(strip.frame_end), first + 1)
@@ -75,7 +75,7 @@ def span_of(strip: bpy.types.NlaStrip, clock: Clock, where: str) -> Span:
 
 
 def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: str) -> KeyMoment:
-    """The key moment that a marker shown on scene frame `frame` stands for; InputError as `span_of`."""
+    """Read the key moment of a marker on scene frame `frame`. Raises InputError if its name cannot be parsed."""
     record, kept = marker.beyond_mocap, None
     if record.line:
         kept = _kept(record.line)
@@ -89,23 +89,34 @@ def key_of(marker: bpy.types.TimelineMarker, frame: int, clock: Clock, where: st
     return replace(kept, time=time, line=None)
 
 
-def said(text: str, start: float, end: float | None = None, where: str = "words") -> Span | KeyMoment:
-    """The span (or, without an end, the key moment) that typed words say; InputError where they are not of the form."""
+def said(text: str, start: float, end: float | None = None, where: str = "labels") -> Span | KeyMoment:
+    """Parse typed labels to a span, or without an end to a key moment.
+
+    Args:
+        text: the labels.
+        start: seconds.
+        end: seconds; None for a key moment.
+        where: for messages.
+    Returns:
+        The span or key moment.
+    Raises:
+        InputError: if the labels cannot be parsed.
+    """
     if end is None:
         return replace(_parsed("0", text, where).keys[0], time=start, line=None)
     return replace(_parsed("0 1", text, where).spans[0], start=start, end=end, line=None)
 
 
 def recorded_span(action: bpy.types.Action) -> Span | None:
-    """The span that an action was written for, None where it was not written by us."""
+    """Read the span for which an action was written; None if the extension did not write it."""
     line = action.beyond_mocap.line
     return _kept(line) if line else None
 
 
 def remember(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
-    """Name a strip by its words and keep the exact line with its action."""
+    """Name a strip by its labels and store the exact line with its action."""
     words = words_of(span)
-    for blanks in range(_MOST_BLANKS):  # which nobody sees, and Blender adds no number to the name
+    for blanks in range(_MOST_BLANKS):  # invisible, and keeps Blender from adding a number to the name
         strip.name = words + " " * blanks
         if strip.name == words + " " * blanks:
             break
@@ -114,31 +125,31 @@ def remember(strip: bpy.types.NlaStrip, span: Span, kind: str) -> None:
 
 
 def tell(marker: bpy.types.TimelineMarker, key: KeyMoment, frame: int) -> None:
-    """Let a marker say this key moment; frame: on its own action."""
+    """Write a key moment to a marker; frame: on its own action."""
     marker.name, marker.frame = words_of(key), frame
     record = marker.beyond_mocap
     record.kind, record.line, record.shown = "moment", line_of(key), marker.name
 
 
 def base_name(name: str) -> str:
-    """A strip's name without what keeps it apart from others: "running" of "running  " and "running.001"."""
+    """Remove what makes a strip's name unique: "running" of "running  " and "running.001"."""
     return re.sub(r"\.\d{3,}$", "", name).rstrip()
 
 
 @lru_cache(maxsize=KEPT)
 def _kept(line: str) -> Span | KeyMoment:
-    """What a kept line says."""
+    """Parse a stored line."""
     found = parse_timeline(line)
     return replace((*found.spans, *found.keys)[0], line=None)
 
 
 def _parsed(times: str, name: str, place: str) -> Timeline:
-    """What a name says at one time or two; InputError where the text form would read it as something else."""
+    """Parse a name at one time or two. Raises InputError if the text form would read it as something else."""
     words = base_name(name)
     try:
         found = parse_timeline(f"{times} {'' if words == NO_WORDS else words}")
     except InputError:
         found = None
     if found is None or "#" in name or len(found.keys if times == "0" else found.spans) != 1:
-        raise InputError(place, f"the words {name.strip()!r}", "words, without numbers and '#'", "write them anew")
+        raise InputError(place, f"the labels {name.strip()!r}", "labels without numbers and '#'", "correct them")
     return found

@@ -1,4 +1,4 @@
-"""What is wrong with the words of a timeline, as lines for the panel and the dialog: before anything is synthesized."""
+"""Problems of a timeline's labels, as lines for the panel and the dialog, before anything is synthesized."""
 
 from __future__ import annotations
 
@@ -16,31 +16,40 @@ from .strips import subject_name
 
 
 class BeyondMocapProblem(bpy.types.PropertyGroup):
-    """One line and where it leads."""
+    """One problem, and where it is."""
 
     line: bpy.props.StringProperty(name="Line", description="What is wrong, and what to do")
-    frame: bpy.props.IntProperty(name="Frame", description="The frame that it is about")
+    frame: bpy.props.IntProperty(name="Frame", description="The frame of the problem")
     target: bpy.props.StringProperty(name="Object", description="The object whose strips these are")
 
 
 class BeyondMocapProblems(bpy.types.PropertyGroup):
-    """What is wrong with the words; on the window manager, since it follows from the strips and is no data."""
+    """Problems of labels; on the window manager, since they follow from the strips and are no data."""
 
     attached_to = ("WindowManager.beyond_mocap_problems",)
     lines: bpy.props.CollectionProperty(name="Problems", type=BeyondMocapProblem,
-                                        description="Everything that was found when words last changed")
+                                        description="All problems found when the labels last changed")
 
 
 def built(scene: bpy.types.Scene):
-    """The library that this session has built from the scene's folder, or None."""
+    """Find the library that this session has built from the scene's folder, or None."""
     settings = scene.beyond_mocap
     folder = absolute(settings.library_folder)
     return session.library(folder, settings.library_unit or None) if folder else None
 
 
 def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True) -> list[str]:
-    """What is wrong with one span or key moment: words out of the vocabulary, and words of key moments that the built
-    library does not have, with the nearest that it has. asked: of a player; what a clip shows need not be there yet."""
+    """Describe what is wrong with one span or key moment.
+
+    Words out of the vocabulary, and labels of key moments that the built library lacks, with the nearest that it has.
+
+    Args:
+        scene: for the library.
+        item: a span or key moment.
+        for_player: of a player; the labels of a clip need not be in the library.
+    Returns:
+        One line for each problem.
+    """
     library = built(scene)
     unknown = _unknown(item, library.words if library else frozenset())
     if asked and library is not None and isinstance(item, KeyMoment) and not unknown:
@@ -49,7 +58,7 @@ def lines_for(scene: bpy.types.Scene, item: Span | KeyMoment, asked: bool = True
 
 
 def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int, str]]:
-    """(frame, line) for everything that is wrong with an object's strips, in time order."""
+    """List (frame, line) for all problems of an object's strips, by time."""
     found, timeline, asked = [], [], bool(target.beyond_mocap_dot.player)
     clock, where = lanes.written_for(target), subject_name(target)
     for track, strip in lanes.strips(target):
@@ -63,13 +72,13 @@ def lines_of(scene: bpy.types.Scene, target: bpy.types.Object) -> list[tuple[int
                 found += _readable(timeline, marker.name, frame, lambda: key_of(marker, frame, clock, where))
     for frame, item in timeline:
         found += [(frame, line) for line in lines_for(scene, item, asked)]
-    if asked:  # what a clip shows may overlap: a kick within a run
+    if asked:  # labels of a clip may overlap: a kick within a run
         found += _together(target, [item for _, item in timeline])
     return sorted(found)
 
 
 def keep(context: bpy.types.Context) -> None:
-    """Work the lines out anew for every timeline of the scene; for the panel, which only shows them."""
+    """Update the problems of all timelines of the scene for the panel, which only shows them."""
     global _known
     _known = _library_of(context.scene)
     found = [(target.name, *line) for target in context.scene.objects if lanes.has(target)
@@ -85,22 +94,22 @@ def keep(context: bpy.types.Context) -> None:
 
 @lru_cache(maxsize=KEPT)
 def _unknown(item: Span | KeyMoment, words: frozenset[str]) -> tuple[str, ...]:
-    """What is wrong with the words themselves; words: the library's own."""
+    """List the words that are not in the vocabulary; words: the library's own."""
     timeline = Timeline((item,)) if isinstance(item, Span) else Timeline((), (item,))
     return tuple(str(error).removeprefix(f"{error.where}: ") for error in problems(timeline, words))
 
 
 def _readable(timeline: list, name: str, frame: float, read) -> list[tuple[int, str]]:
-    """Adds what a strip or marker says to `timeline`; a line where its name cannot be read."""
+    """Add the item of a strip or marker to `timeline`; return a line if its name cannot be read."""
     try:
         timeline.append((round(frame), read()))
         return []
     except InputError:
-        return [(round(frame), f"'{base_name(name)}': words have no numbers and no '#'; rename it")]
+        return [(round(frame), f"'{base_name(name)}': labels have no numbers and no '#'; rename it")]
 
 
 def out_of_date(scene: bpy.types.Scene) -> bool:
-    """Whether another library has been chosen or built since the lines were worked out."""
+    """Return whether another library has been chosen or built since the problems were listed."""
     return _known != _library_of(scene)
 
 
@@ -113,7 +122,7 @@ _known: tuple = ()
 
 
 def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
-    """Spans that overlap and key moments at one time."""
+    """List spans that overlap and key moments at the same time."""
     timeline = Timeline(tuple(item for item in items if isinstance(item, Span) and item.words),
                         tuple(item for item in items if isinstance(item, KeyMoment)))
     clock, found = lanes.written_for(target), []
@@ -123,12 +132,12 @@ def _together(target: bpy.types.Object, items: list) -> list[tuple[int, str]]:
             found.append((clock.whole(b.start), f"{both} overlap; shorten one"))
     for a, b in zip(timeline.keys, timeline.keys[1:]):
         if b.time - a.time <= 1e-6:
-            found.append((clock.whole(b.time), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' are at one time"))
+            found.append((clock.whole(b.time), f"'{' '.join(a.words)}' and '{' '.join(b.words)}' are at the same time"))
     return found
 
 
 def _missing(scene: bpy.types.Scene, timeline: Timeline, library) -> list[str]:
-    """The nearest words that the library has, where it lacks those of a key moment."""
+    """Find the nearest labels of the library for key moments that it lacks."""
     mirror = scene.beyond_mocap.mirror
     choices = [key.words for key in library.keys if mirror or not library.clips[key.clip].mirrored]
     lines = []

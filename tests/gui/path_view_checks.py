@@ -142,7 +142,7 @@ def check_figures_come_when_the_curve_is_at_rest():
     yield from until(lambda: "skate" in rider().beyond_mocap_ride.figures)
     told = room("panels.path_editing").figure_lines(rider().beyond_mocap_ride.figures)
     output.say("     " + "; ".join(line.replace("\t", " ") for line in told.splitlines()))
-    assert "Feet slide" in told and "Off the path" in told
+    assert "Foot slide" in told and "Distance to path" in told
 
 
 def check_keys_flick_through_the_cameras_and_back():

@@ -192,10 +192,10 @@ def check_keys_by_hand_and_what_is_out_of_date():
     yield from window.press("I")
     yield 0.5
     run("object.mode_set", "EXEC_DEFAULT", mode="OBJECT")
-    yield from until(lambda: "hand-made" in told())
+    yield from until(lambda: "manual" in told())
     output.say(f"     told: {told().strip()}")
     settings().alpha = 0.35
-    yield from until(lambda: "choices" in told())
+    yield from until(lambda: "settings" in told())
     yield 0.6
     window.picture(PICTURES / "result-out-of-date.png")
     run("beyond_mocap.update", player=settings().players[0].name)

@@ -167,8 +167,8 @@ def test_accepted_results_still_know_where_they_lay(shown, room, form):
 def test_lines_of_the_report_keep_their_seconds(shown):
     player = shown.players[0]
     names = [line.split(":")[0] for line in player.quality.splitlines()]
-    assert "Feet slide" in names and all(len(line.split("\t")) == 3 for line in player.quality.splitlines())
-    root = next(line for line in player.quality.splitlines() if line.startswith("Off track:"))
+    assert "Foot slide" in names and all(len(line.split("\t")) == 3 for line in player.quality.splitlines())
+    root = next(line for line in player.quality.splitlines() if line.startswith("Distance to track:"))
     assert root.split("\t")[1:] == ["≤ 0.50", "met"]
     text, second, status = player.moments.splitlines()[0].split("\t")
     assert text.startswith("5.0 s  kick") and float(second) == 5.0 and status in {"met", "missed"}
@@ -181,8 +181,8 @@ def test_lines_of_the_report_keep_their_seconds(shown):
 def test_words_met_is_at_least_what_is_wanted(room):
     report = {"fps": 30.0, "annotation_similarity": {"all": -0.95}, "warp_rate": {"min": 0.8, "max": 1.0}}
     lines = room("result.quality").quality_lines(report).splitlines()
-    assert lines == ["Words met: 97.5 %\t≥ 95.0\tmet", "Slowest clip: 0.80 x\t≥ 0.85\tmissed",
-                     "Fastest clip: 1.00 x\t≤ 1.15\tmet"]
+    assert lines == ["Labels matched: 97.5 %\t≥ 95.0\tmet", "Lowest playback rate: 0.80 x\t≥ 0.85\tmissed",
+                     "Highest playback rate: 1.00 x\t≤ 1.15\tmet"]
 
 
 def test_jump_goes_to_the_second_and_selects_the_body(shown):

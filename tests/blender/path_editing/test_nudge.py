@@ -122,7 +122,7 @@ def test_what_is_missing_is_said():
     with pytest.raises(RuntimeError, match="edit mode"):
         bpy.ops.beyond_mocap.nudge_points()
     curve("BEZIER")
-    with pytest.raises(RuntimeError, match="no control point selected"):
+    with pytest.raises(RuntimeError, match="no control point is selected"):
         bpy.ops.beyond_mocap.nudge_points()
 
 

@@ -227,7 +227,7 @@ def test_who_cannot_be_looked_at_in_time_is_told(scene, said, part, monkeypatch)
     monkeypatch.setattr(module.bystanders, "__defaults__", (0.0,))
     bpy.ops.beyond_mocap.path_apart()
     [line] = said[0].left
-    assert line.startswith(f"{first.name} is left out") and "slow" in line
+    assert line.startswith(f"{first.name} is left out") and "too long" in line
 
 
 def test_a_statue_is_gone_round(scene, said):  # noqa: F811
@@ -252,16 +252,16 @@ def test_a_rider_that_is_changed_afterwards_says_so_until_it_is_pressed_again(sc
     follow = part("path_editing.live").follow
     told = [first.beyond_mocap_ride, second.beyond_mocap_ride]
     follow(scene)
-    assert not any("Keep Apart" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.told for ride in told)
     first.beyond_mocap_ride.curve.location.y += 0.2
     bpy.context.view_layer.update()
     follow(scene)
-    assert ["changed since Keep Apart" in ride.told for ride in told] == [True, False]
+    assert ["changed since Avoid Collisions" in ride.told for ride in told] == [True, False]
     bpy.ops.beyond_mocap.path_apart()
-    assert not any("Keep Apart" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.told for ride in told)
     first.beyond_mocap_ride.curve.location.y += 0.2
     bpy.context.view_layer.update()
     follow(scene)
     bpy.ops.beyond_mocap.path_apart(clear=True)
     follow(scene)
-    assert not any("Keep Apart" in ride.told for ride in told)
+    assert not any("Avoid Collisions" in ride.told for ride in told)

@@ -255,7 +255,7 @@ def test_two_riders_each_on_his_own_or_both_on_one(scene, part):
     assert not first.beyond_mocap_ride.on and not second.beyond_mocap_ride.on and bpy.context.object in (first, second)
 
 
-BAD = {"one point": ([(0, 0, 0)], "no line"), "repeated": ([(1, 1, 0)] * 4, "all its points are one"),
+BAD = {"one point": ([(0, 0, 0)], "no line"), "repeated": ([(1, 1, 0)] * 4, "all points are equal"),
        "short": ([(0, 0, 0), (0.01, 0, 0)], "0.01 m long")}
 ODD = {"repeated points": [(0, 0, 0), (0, 0, 0), (2, 0, 0), (2, 0, 0), (4, 1, 0)],
        "cusp": [(0, 0, 0), (4, 0, 0), (0, 0.0, 0)],
@@ -296,7 +296,7 @@ def test_a_curve_that_is_no_path_is_told_and_the_last_good_motion_stays(scene, p
     assert line in body.beyond_mocap_ride.told and "\n" not in body.beyond_mocap_ride.told
     assert bits(part, body) == before
     bpy.data.objects.remove(odd)
-    assert live.follow(scene) == 0 and "its curve is gone" in body.beyond_mocap_ride.told
+    assert live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
     assert bits(part, body) == before
 
 
@@ -431,10 +431,12 @@ def test_a_deleted_curve_and_ground_are_not_kept_for_who_rode_them(scene, part):
     assert live.follow(scene) == 1
     was = bits(part, body)[:3]
     bpy.ops.object.delete()
-    assert live.follow(scene) == 0 and "Plane is gone" in body.beyond_mocap_ride.told and bits(part, body)[:3] == was
+    assert (live.follow(scene) == 0 and "Plane is not in the scene" in body.beyond_mocap_ride.told
+            and bits(part, body)[:3] == was)
     choose(drawn)
     bpy.ops.object.delete()
-    assert live.follow(scene) == 0 and "curve is gone" in body.beyond_mocap_ride.told and bits(part, body)[:3] == was
+    assert (live.follow(scene) == 0 and "its curve is not in the scene" in body.beyond_mocap_ride.told
+            and bits(part, body)[:3] == was)
     choose(body)
     assert bpy.ops.beyond_mocap.leave_path() == {"FINISHED"}
     assert body.beyond_mocap_ride.curve is None and body.beyond_mocap_ride.ground is None
@@ -500,7 +502,7 @@ def test_who_rides_already_takes_the_selected_curve(scene, part):
     bpy.ops.beyond_mocap.edit_path()
     own = first.beyond_mocap_ride.curve
     choose(first)
-    with pytest.raises(RuntimeError, match="rides already"):
+    with pytest.raises(RuntimeError, match="already follows a path"):
         bpy.ops.beyond_mocap.edit_path()
     ring, point = circle(), drawn([(0, 0, 0)])
     before = bits(part, first), bits(part, second)
@@ -579,7 +581,7 @@ def test_a_curve_that_moves_with_time_is_ridden_as_it_lay_when_edited(scene, par
         drawn.keyframe_insert("location", frame=frame)
     scene.frame_set(50)
     live.follow(scene)
-    assert "it moves" in body.beyond_mocap_ride.told
+    assert "its animation is ignored" in body.beyond_mocap_ride.told
     before = bits(part, body)[:3]
     scene.frame_set(90)
     assert live.follow(scene) == 0 and bits(part, body)[:3] == before
@@ -617,7 +619,7 @@ def test_nobody_cycles_for_hours(scene, part):
     body.beyond_mocap_ride.cycle = True
     before = bits(part, body)[:3]
     bpy.context.view_layer.update()
-    assert live.follow(scene) == 0 and "22 minutes at most" in body.beyond_mocap_ride.told
+    assert live.follow(scene) == 0 and "22 minutes or less" in body.beyond_mocap_ride.told
     assert bits(part, body)[:3] == before
     body.beyond_mocap_ride.cycle = False
     assert live.follow(scene) == 1
@@ -705,7 +707,7 @@ def test_a_ground_that_moves_with_time_does_not_change_the_motion_with_the_frame
         floor.keyframe_insert("location", frame=frame)
     scene.frame_set(1)
     body.beyond_mocap_ride.ground = floor
-    assert live.follow(scene) == 1 and "ground Plane: it moves" in body.beyond_mocap_ride.told
+    assert live.follow(scene) == 1 and "ground Plane: its animation is ignored" in body.beyond_mocap_ride.told
     was = bits(part, body)[:3]
     scene.frame_set(30)
     assert live.follow(scene) == 0 and bits(part, body)[:3] == was
@@ -742,7 +744,7 @@ def test_a_motion_longer_than_the_scene_is_told_as_long_as_it_is(scene, part):
     ride.cycle = True
     follow(scene)
     last = int(body.animation_data.action.frame_range[1])
-    assert last > 250 and ride.told.endswith(f"goes on to frame {last}, the scene ends at 250")
+    assert last > 250 and ride.told.endswith(f"ends at frame {last}, after the end of the scene at 250")
     assert scene.frame_end == 250
     scene.frame_end = last
     follow(scene)
@@ -757,7 +759,7 @@ def test_a_new_curve_takes_back_the_line_about_the_one_before(scene, part):
         point.co = point.handle_left = point.handle_right = (0, 0, 0)
     bpy.context.view_layer.update()
     follow(scene)
-    assert "all its points are one" in ride.told
+    assert "all points are equal" in ride.told
     bpy.ops.beyond_mocap.path_curve(shape="FITTED")
     follow(scene)
     assert ride.told == ""

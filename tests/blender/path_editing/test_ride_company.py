@@ -81,7 +81,7 @@ def test_who_makes_another_result_leaves_the_path_first(one, part, verb):  # noq
     assert not body.beyond_mocap_ride.on
     np.testing.assert_array_equal(poses(body, FRAMES), was)
     if verb == "synthesize":
-        assert "left its path" in one.warnings
+        assert "path edit reverted" in one.warnings
 
 
 def test_a_motion_that_was_kept_is_the_users_own(one, part):  # noqa: F811
@@ -127,7 +127,7 @@ def test_baking_onto_a_rig_that_rides_takes_it_off_its_path(part):
     bpy.ops.beyond_mocap.bake_to_rig()
     ride(rig, part)
     assert bpy.ops.beyond_mocap.bake_to_rig() == {"FINISHED"}
-    assert not rig.beyond_mocap_ride.on and "left its path" in settings.told
+    assert not rig.beyond_mocap_ride.on and "path edit reverted" in settings.told
     assert bpy.ops.beyond_mocap.unbake() == {"FINISHED"} and rig.animation_data.action is None
 
 

@@ -153,11 +153,12 @@ def test_figures_become_lines_with_what_is_aimed_for():
         "seam_jerk": {"seams": 0, "max": None}, "foot_correction_m": {"p95": float("nan")},
     })).splitlines()
     assert told == [
-        "Off the path: 0.70 cm\t≤ 0.81\tmet", "Speed off: 2.00 %\t≤ 1.00\tmissed", "Feet slide: 1.5 cm/s\t≤ 2.2\tmet",
-        "Not planted: 9.0 cm/s\t\t",
+        "Distance to path: 0.70 cm\t≤ 0.81\tmet", "Speed error: 2.00 %\t≤ 1.00\tmissed",
+        "Foot slide: 1.5 cm/s\t≤ 2.2\tmet",
+        "Slide unplanted: 9.0 cm/s\t\t",
     ]
     close = lines(json.dumps({"root_error_m": {"mean": 0.002}, "root_error_own_m": {"mean": 0.0016}}))
-    assert close == "Off the path: 0.20 cm\t≤ 0.50\tmet"
+    assert close == "Distance to path: 0.20 cm\t≤ 0.50\tmet"
     assert lines("") == lines("{") == lines("[]") == ""
 
 
@@ -202,4 +203,4 @@ def test_update_path_measures_at_once():
     bpy.ops.beyond_mocap.edit_path()
     bpy.ops.beyond_mocap.update_path()
     told = import_module(f"{EXTENSION}.panels.path_editing").figure_lines(body.beyond_mocap_ride.figures)
-    assert "Feet slide" in told
+    assert "Foot slide" in told

@@ -140,7 +140,7 @@ def test_the_whole_road(extension, ready, core, session):
         again = core("synthesis.synthesize").synthesize(built, made.plan)
         assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
         assert np.array_equal(made.take.motion.root_positions, again.motion.root_positions)
-        assert "Feet slide" in player.quality
+        assert "Foot slide" in player.quality
     synthesized = state()
     assert press(bpy.ops.beyond_mocap.accept) == {"FINISHED"}
     accepted = state()
@@ -203,7 +203,7 @@ def test_solved_touches_come_out_as_the_core_has_them(extension, ready, match, c
     made = session.made(player.take)
     key, = made.report["keys"]
     assert key["time_s"] == 6.0 and key["solved_time_s"] == pytest.approx(6.13, abs=0.03)
-    assert key["contact_gap_m"] < 0.005 and f"touched at {key['solved_time_s']:.2f} s" in player.moments
+    assert key["contact_gap_m"] < 0.005 and f"touch at {key['solved_time_s']:.2f} s" in player.moments
     built = session.library(bpy.context.scene.beyond_mocap.library_folder, None)
     again = core("synthesis.synthesize").synthesize(built, made.plan)
     assert np.array_equal(made.take.motion.rotations, again.motion.rotations)
@@ -301,7 +301,7 @@ def test_words_that_the_library_lacks(ready, match):
     refused(bpy.ops.beyond_mocap.synthesize, "strips of player1: .*6 s: .*header")
     ready.nearest = True
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
-    assert ready.players[0].moments.startswith("6.0 s  header, shown as ")
+    assert ready.players[0].moments.startswith("6.0 s  header, replaced by ")
 
 
 def test_a_take_of_another_session(ready, session):

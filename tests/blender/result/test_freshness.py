@@ -35,11 +35,11 @@ def test_nothing_is_out_of_date_at_first(renew, made, ready):  # noqa: F811
 
 
 @pytest.mark.parametrize("change, line", [
-    (lambda settings, match: setattr(settings, "alpha", 0.5), "choices in step 3"),
+    (lambda settings, match: setattr(settings, "alpha", 0.5), "settings of step 3"),
     (lambda settings, match: (match / "player1.csv").write_text((match / "player1.csv").read_text().replace(",0.0",
                                                                                                             ",0.1")),
      "track"),
-    (lambda settings, match: setattr(settings, "track_window", 2.0), "choices"),
+    (lambda settings, match: setattr(settings, "track_window", 2.0), "settings"),
     (lambda settings, match: bpy.data.objects.remove(settings.players[0].body), "body has been deleted"),
 ])
 def test_each_cause_has_its_line_and_update_mends_it(renew, made, ready, match, change, line):  # noqa: F811
@@ -59,13 +59,13 @@ def test_words_of_a_text_stay_the_words(renew, made, ready, scene):  # noqa: F81
     assert bpy.ops.beyond_mocap.synthesize() == {"FINISHED"}
     assert strips.read(made, bpy.context.scene) is None and renew().lines == ""
     text.write("8.0 12.0 jogging\n")
-    assert "words" in renew().lines
+    assert "labels" in renew().lines
 
 
 def test_words(renew, made, ready, session, scene):  # noqa: F811
     plans, strips = scene("result.plans"), scene("timeline.strips")
     strips.add_moment(bpy.context, made, 9.0, ("kick",))
-    assert "words" in renew().lines
+    assert "labels" in renew().lines
     bpy.ops.beyond_mocap.update()
     assert renew().lines == "" and session.made(made.take).plan.timeline == plans.plan_of(ready, made)[0].timeline
 
@@ -93,7 +93,7 @@ def test_after_the_file_was_opened_again_update_makes_the_same_bits(renew, made,
     session.clear()
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     player = bpy.context.scene.beyond_mocap.players[0]
-    assert "not in this session" in renew().lines and "1 hand-made key:" in renew().notes
+    assert "not in this session" in renew().lines and "1 manual key:" in renew().notes
     assert player.result.state == "ACCEPTED"
     bpy.ops.beyond_mocap.update()
     after = session.made(player.take).take
@@ -116,7 +116,7 @@ def test_a_stretch_is_another_solution_and_pressed_again_a_third(made, session):
 
 def test_a_stretch_by_what_is_selected(made, session):  # noqa: F811
     made.body.select_set(False)
-    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "nothing says which seconds")
+    refused(bpy.ops.beyond_mocap.resynthesize_stretch, "no range of time is selected")
     scene = bpy.context.scene
     scene.use_preview_range, scene.frame_preview_start, scene.frame_preview_end = True, 61, 121
     take = made.take
@@ -147,7 +147,7 @@ def test_variants_to_choose_from(made, session):  # noqa: F811
     for a in range(3):
         for b in range(a):
             assert np.any(takes[a].motion.rotations != takes[b].motion.rotations, axis=(1, 2)).mean() > 0.5
-    assert "% other" in variants[1].summary and "slide" in variants[0].summary
+    assert "% different" in variants[1].summary and "slide" in variants[0].summary
     assert bpy.ops.beyond_mocap.preview(number=3) == {"FINISHED"}
     assert made.take == made.result.variants[2].name
     bpy.ops.beyond_mocap.accept()

@@ -132,7 +132,7 @@ def test_nothing_chosen_or_something_else():
 
 
 def test_a_text_of_words_is_dropped_on_a_clip_and_on_a_player(core, rooms, library, tmp_path):
-    with pytest.raises(RuntimeError, match="words belong to a player"):
+    with pytest.raises(RuntimeError, match="labels belong to a player"):
         bpy.ops.beyond_mocap.import_words(filepath=str(library / "jogging_2_9.txt"))
     bpy.context.scene.render.fps = 30
     bpy.ops.beyond_mocap.annotate_clip(path="kick_low_top.bvh")

@@ -55,7 +55,7 @@ def test_text_and_file(player, asked, tmp_path):
     before = asked()
     assert before == "2.413 4 running left\n4 6 jogging\n6.02 kick right low\n9 header -jump\n"
     assert_one_step(ops.words_to_text)
-    text = bpy.data.texts["player1 words"]
+    text = bpy.data.texts["player1 labels"]
     assert text.as_string() == before and bpy.context.scene.beyond_mocap.players[0].annotation_text == text
     assert ops.export_words(filepath=str(tmp_path / "out.txt")) == {"FINISHED"}
     assert (tmp_path / "out.txt").read_text() == before
@@ -75,7 +75,7 @@ def test_add_span(player, asked):
     assert "0 1 standing\n" in asked()
     ops.add_span(words="sprinting", start=10.0, end=11.5)
     assert "10 11.5 sprinting\n" in asked()
-    refused("words", ops.add_span, words="3 walking")
+    refused("labels", ops.add_span, words="3 walking")
     refused("not after the start", ops.add_span, words="walking", start=3.0, end=2.0)
 
 
@@ -98,7 +98,7 @@ def test_split_and_join(player, asked):
 
 def test_moments(player, asked):
     bpy.context.scene.frame_set(1 + 24 * 8)
-    refused("Pick a key moment first", ops.delete_moment)
+    refused("Select a key moment first", ops.delete_moment)
     assert_one_step(ops.add_moment, words="receive foot")
     assert "8 receive foot\n" in asked()
     assert_one_step(ops.move_moment, frames=-24)
@@ -110,7 +110,7 @@ def test_moments(player, asked):
     assert "receive" not in asked()
     assert_one_step(ops.go_to_moment, strip="Moments", index=0)
     assert bpy.context.scene.frame_current == 145
-    refused("one that is there", ops.go_to_moment, strip="Moments", index=7)
+    refused("one of this strip", ops.go_to_moment, strip="Moments", index=7)
     assert_one_step(ops.edit_words, words="kick left top")
     assert "6.02 kick left top\n" in asked()
 
@@ -191,7 +191,7 @@ def test_what_is_wrong_is_told(player, room):
     next(track for track in dot().animation_data.nla_tracks if track.name == "Words").strips[0].name = "4 times"
     ops.add_span(words="walking", start=4.5, end=5.0)
     assert [line for _, line in checks.lines_of(scene, dot())] == [
-        "'4 times': words have no numbers and no '#'; rename it", "'jogging' and 'walking' overlap; shorten one"]
+        "'4 times': labels have no numbers and no '#'; rename it", "'jogging' and 'walking' overlap; shorten one"]
 
 
 def test_nobody_there():

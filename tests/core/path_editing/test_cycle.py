@@ -154,10 +154,10 @@ def test_a_recording_that_ends_at_the_loop_is_carried_on():
 
 
 @pytest.mark.parametrize("make, says", [
-    (still, "stays where it is"),
+    (still, "stays in place"),
     (lambda: planted(20), "can be repeated"),
     (lambda: prepare(gait(5.0, 1.0, 60.0).frames(0, 4), RideSettings()).residuals, "can be repeated"),
-    (lambda: prepare(gait(0.0, 3.0, 30.0), RideSettings()).residuals, "stays where it is"),
+    (lambda: prepare(gait(0.0, 3.0, 30.0), RideSettings()).residuals, "stays in place"),
 ])
 def test_what_has_no_stride_is_told(make, says):
     with pytest.raises(InputError, match=says) as told:
@@ -181,7 +181,7 @@ def test_an_endless_path_is_not_filled_endlessly(walk, monkeypatch):
     monkeypatch.setattr(cycle, "MOST_FRAMES", 3000)
     out = cycled(walk, 1e9)
     assert 2000 < len(out.residuals) < 3500
-    assert "1000000000 m long: the motion ends after 1 minutes" in out.told[0]
+    assert "1000000000 m is too long: the motion ends after 1 minutes" in out.told[0]
 
 
 def test_a_body_without_known_feet_is_repeated_by_its_poses():

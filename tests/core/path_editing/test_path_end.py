@@ -32,7 +32,7 @@ def test_repeating_begins_again_with_motion_and_path():
     assert out.count == 41 and len(out.shown) == 100
     assert out.again.tolist() == [41, 82] and np.array_equal(out.shown[41:82], np.arange(41))
     assert np.array_equal(out.shown[82:], np.arange(18))
-    assert "begins again 2 times" in out.told[0] and "again once" in find_ending(ARC, 3.0, FPS, "repeat").told[0]
+    assert "restarts 2 times" in out.told[0] and "restarts once" in find_ending(ARC, 3.0, FPS, "repeat").told[0]
 
 
 def test_a_rider_waits_once_only():
