@@ -1,5 +1,6 @@
-"""Ball & Passes: the panel and its parts: players who keep a ball going; the ball tracked, struck, carried, aimed; live
-streams, in which a user's own motion arrives while it is made."""
+"""Panel "Ball & Passes" and its sections: players who pass a ball; the ball tracked, struck, carried and aimed; live
+streams, which receive a user's motion while it is performed.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ KIND_ICONS = {"toss": "IPO_SINE", "pass": "IPO_QUAD", "attack": "IPO_EXPO"}
 
 
 class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
-    """Touches that were solved from tracking."""
+    """Touches solved from tracking."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -31,14 +32,14 @@ class BEYOND_MOCAP_UL_touches(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
-    """The ball and the players who keep it going."""
+    """The ball and the players who pass it."""
 
     bl_label = "Ball & Passes"
     bl_order = 8
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        """Its parts, each folded until it is wanted."""
+        """Draw the sections; most are closed at first."""
         layout = self.layout
         section(layout, "ball_scene", "Passing Scene", lambda opened: passing(self, opened, context), closed=False)
         section(layout, "ball_tracked", "Ball from Tracking", lambda opened: tracked(self, opened, context))
@@ -50,7 +51,7 @@ class BEYOND_MOCAP_PT_ball(Step, bpy.types.Panel):
 
 
 def tracked(panel, layout, context) -> None:
-    """The button, what was solved, and the touches."""
+    """Draw the button, the solution, and the touches."""
     settings = context.scene.beyond_mocap_passes
     layout.operator("beyond_mocap.solve_ball", icon="SPHERE")
     panel.progress(context, "ball")
@@ -61,17 +62,17 @@ def tracked(panel, layout, context) -> None:
     layout.template_list("BEYOND_MOCAP_UL_touches", "", settings, "touches", settings, active_propname="active_touch",
                          rows=5)
     if touch := active_row(settings.touches, settings.active_touch):
-        layout.label(text=f"{touch.kind} by the {touch.part}, {touch.confidence:.0%} sure")
+        layout.label(text=f"{touch.kind} by the {touch.part}, confidence {touch.confidence:.0%}")
         row = layout.row(align=True)
         row.prop(touch, "words", text="")
         row.operator("beyond_mocap.jump_to", text="", icon="PLAY").seconds = touch.time
     row = layout.row(align=True)
     row.operator("beyond_mocap.accept_touches", icon="CHECKMARK")
-    row.operator("beyond_mocap.accept_touches", text="of Active").active = True
+    row.operator("beyond_mocap.accept_touches", text="Of Active").active = True
 
 
 def hits(layout, context) -> None:
-    """What to look for, the graph, and a line for each strike that goes there."""
+    """Draw the settings, the graph, and a line for each strike that jumps to it."""
     body = subject(context)
     if body is None:
         paragraph(layout, "Select an armature with a motion", "INFO")
@@ -99,7 +100,7 @@ def hits(layout, context) -> None:
 
 
 def carried(layout, context) -> None:
-    """Who carries the ball and when."""
+    """Draw who carries the ball and when."""
     settings, body, ball = context.scene.beyond_mocap_passes, subject(context), ball_of(context)
     layout.label(text=ball.name if ball is not None else "No ball: select one",
                  icon="SPHERE" if ball is not None else "INFO")
@@ -124,7 +125,7 @@ def carried(layout, context) -> None:
 
 
 def aim(layout, context) -> None:
-    """The button; of the ball that is meant, who strikes it, towards what and how, and what comes of it."""
+    """Draw the button, and the aimed ball's settings and result."""
     ball = aimed_ball(context)
     layout.operator("beyond_mocap.aim_ball", icon="CON_TRACKTO", text="Aim Again" if ball is not None else "Aim Ball")
     if ball is not None:
@@ -133,7 +134,7 @@ def aim(layout, context) -> None:
 
 
 def of_aimed_ball(layout, ball) -> None:
-    """An aimed ball's settings and figures."""
+    """Draw an aimed ball's settings and figures."""
     settings = ball.beyond_mocap_aim
     row = layout.row(align=True)
     row.label(text=ball.name, icon="SPHERE")
@@ -166,7 +167,7 @@ def of_aimed_ball(layout, ball) -> None:
 
 
 def physics(layout, context, ball) -> None:
-    """To Blender's rigid bodies and back."""
+    """Draw the handover to Blender's rigid bodies and back."""
     row = layout.row(align=True)
     if ball is not None and ball.beyond_mocap_aim.handed:
         row.operator("beyond_mocap.ball_from_physics", icon="LOOP_BACK")
@@ -177,7 +178,7 @@ def physics(layout, context, ball) -> None:
 
 
 def stream(layout, context) -> None:
-    """Where to listen, how it does, and the last strike."""
+    """Draw where to listen, the status, and the last strike."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
     column = split(layout)
     chosen = column.column()
@@ -199,7 +200,7 @@ def stream(layout, context) -> None:
 
 
 def live(panel, layout, context) -> None:
-    """Who has the ball, and to whom it goes."""
+    """Draw who has the ball, and who gets it next."""
     settings, told = context.scene.beyond_mocap_stream, context.window_manager.beyond_mocap_streaming
     column = split(layout)
     column.prop_search(settings, "target", context.scene.beyond_mocap_passes, "players")
@@ -228,7 +229,7 @@ class BEYOND_MOCAP_UL_passers(bpy.types.UIList):
 
 
 class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
-    """The passes, one after the other."""
+    """The passes in order."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
         row = layout.row(align=True)
@@ -243,7 +244,7 @@ class BEYOND_MOCAP_UL_passes(bpy.types.UIList):
 
 
 def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> None:
-    """A list with what adds to it, takes away and moves."""
+    """Draw a list with buttons to add, remove and move rows."""
     row = layout.row()
     row.template_list(f"BEYOND_MOCAP_UL_{kind}", "", settings, rows, settings, active_propname=active, rows=3)
     column = row.column(align=True)
@@ -253,7 +254,7 @@ def lists(layout, kind: str, settings, rows: str, active: str, verb: str) -> Non
 
 
 def passing(panel, layout, context) -> None:
-    """Players, passes, ball, and what comes of them."""
+    """Draw players, passes, ball, and their result."""
     settings = context.scene.beyond_mocap_passes
     row = layout.row(align=True)
     row.operator_menu_enum("beyond_mocap.passes_sample", "sample", icon="PRESET")
@@ -275,12 +276,12 @@ def passing(panel, layout, context) -> None:
         paragraph(layout, line, "INFO")
     if settings.strikes:
         section(layout, "ball_strikes", "Strikes", lambda opened: strikes(opened, settings))
-    section(layout, "ball_choices", "Choices", lambda opened: choices(opened, settings))
+    section(layout, "ball_choices", "Options", lambda opened: choices(opened, settings))
     section(layout, "ball_ball", "Ball & Air", lambda opened: of_ball(opened, settings))
 
 
 def strikes(layout, settings) -> None:
-    """Figures, and a line for each strike that goes there."""
+    """Draw figures, and a line for each strike that jumps to it."""
     table(layout, settings.figures.splitlines())
     column = layout.column(align=True)
     for frame, text in told_lines(settings.strikes):
@@ -288,7 +289,7 @@ def strikes(layout, settings) -> None:
 
 
 def of_player(layout, player) -> None:
-    """Where the picked player stands, and what he strikes with."""
+    """Draw where the active player is, and what they strike with."""
     column = split(layout)
     for name in ("place", "body", "part"):
         column.prop(player, name)
@@ -302,7 +303,7 @@ def of_player(layout, player) -> None:
 
 
 def of_pass(layout, settings, one) -> None:
-    """How the picked pass goes."""
+    """Draw the settings of the active pass."""
     column = split(layout)
     column.prop_search(one, "who", settings, "players")
     column.prop_search(one, "to", settings, "players")
@@ -321,7 +322,7 @@ def of_pass(layout, settings, one) -> None:
 
 
 def choices(layout, settings) -> None:
-    """What holds for all passes."""
+    """Draw the settings of all passes."""
     column = split(layout)
     for name in ("library_folder", "repeat", "rate", "start_frame", "lead_in", "lead_out", "serve_from"):
         column.prop(settings, name)
@@ -338,17 +339,17 @@ def choices(layout, settings) -> None:
 
 
 def weights(layout, settings) -> None:
-    """Of eq. 1 and 2."""
+    """Draw the weights of equations 1 and 2."""
     column = split(layout)
-    for title, names in (("Two Strikes Compared", ("speed", "vectors", "times")),
-                         ("Two Poses Compared", ("position", "velocity", "bones"))):
+    for title, names in (("Strike Comparison", ("speed", "vectors", "times")),
+                         ("Pose Comparison", ("position", "velocity", "bones"))):
         column.label(text=title)
         for name in names:
             column.prop(settings.weights, name)
 
 
 def of_ball(layout, settings) -> None:
-    """The ball's kind, or numbers of one's own."""
+    """Draw the ball's kind, or custom values."""
     column = split(layout)
     column.prop(settings, "ball")
     column.prop(settings, "own")
