@@ -243,7 +243,13 @@ def _line(early: np.ndarray, late: np.ndarray, lag: float) -> tuple[float, float
 class _Fit:
     """Count events that have a touch of their player within _FIT_SECONDS, at any lag.
 
-    when (T,) s and who (T,) of touches; since (E,) s of events and span s on the period's clock.
+    Args:
+        events: E events.
+        since: (E,) s of events on the period's clock.
+        when: (T,) s of touches on the period's clock.
+        who: (T,) players of the touches.
+        span: (start, end) s on the period's clock.
+        drift: s per second.
     """
 
     def __init__(self, events, since: np.ndarray, when: np.ndarray, who: np.ndarray, span, drift: float):

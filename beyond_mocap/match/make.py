@@ -90,7 +90,7 @@ def make_match(
     Args:
         request: the request.
         progress: receives the share done and a text.
-        cancelled: asked now and then.
+        cancelled: called now and then; True cancels the work.
     Returns:
         The result.
     Raises:

@@ -386,7 +386,7 @@ def _edit(row, where: str, array) -> NamedEdit:
     if np.any(clip < 0) or np.any(clip >= len(clips)):
         raise InputError(f"{where}: clip", f"{clip.min()} to {clip.max()}", f"0 to {len(clips) - 1}")
     if np.abs(first).max() > _MOST_FRAMES or np.abs(runs["rate"]).max() > _MOST_RATE:
-        raise InputError(f"{where}: first, rate", "values beyond any clip", f"frames up to {_MOST_FRAMES:g}")
+        raise InputError(f"{where}: first, rate", "values too large for a clip", f"frames up to {_MOST_FRAMES:g}")
     keys = tuple(_named_key(value, len(clips), where) for value in entries(row["placed"], f"{where}: placed"))
     return NamedEdit(clips=clips, **runs, keys=keys)
 

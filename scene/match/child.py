@@ -34,7 +34,7 @@ def run(arguments: list[str], progress: Callable[[float, str], None], cancelled:
     Args:
         arguments: of the command line.
         progress: receives the share done and a text.
-        cancelled: asked now and then.
+        cancelled: called now and then; True cancels the work.
     Returns:
         Its notes.
     Raises:

@@ -97,7 +97,7 @@ def scenery(wanted: Wanted, library: "Library | None", progress: Callable[[float
         request: what to display.
         library: the clips; None: build the library.
         progress: receives the share done and a text.
-        cancelled: asked now and then.
+        cancelled: called now and then; True cancels the work.
     Returns:
         The library, the section, and messages about players who cannot be displayed.
     Raises:

@@ -129,7 +129,7 @@ def fit_launches(stretches: Stretches, ball: Ball = FOOTBALL, cancelled: Callabl
     Args:
         stretches: S stretches.
         ball: the ball's physics.
-        cancelled: asked between batches.
+        cancelled: called between batches; True cancels the work.
     Returns:
         The launches.
     Raises:

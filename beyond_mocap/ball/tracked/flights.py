@@ -37,7 +37,7 @@ def flown(samples: Samples, pieces: list[BallPiece], moments: np.ndarray, height
         pieces: in order, without gaps within a window.
         moments: (K,) s of the touches.
         heights: whether the heights of the samples are used.
-        cancelled: asked between batches.
+        cancelled: called between batches; True cancels the work.
     Returns:
         The pieces with flights in place of those they explain.
     Raises:

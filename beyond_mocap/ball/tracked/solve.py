@@ -116,7 +116,7 @@ def solve(times: np.ndarray, ball: np.ndarray, positions: np.ndarray, players: S
         pitch: length and width m.
         where: the feed's name, for messages.
         progress: receives the share done and the step.
-        cancelled: asked between steps.
+        cancelled: called between steps; True cancels the work.
     Returns:
         Touches, trajectory and exits.
     Raises:
@@ -383,7 +383,7 @@ def solve_ball(source: Match | Track, progress: Callable[[float, str], None] | N
     Args:
         source: the match or track.
         progress: receives the share done and the step.
-        cancelled: asked between steps.
+        cancelled: called between steps; True cancels the work.
         start: s. None: from the beginning.
         end: s. None: to the end.
     Returns:

@@ -124,7 +124,7 @@ def joined_spans(spans: list[Span]) -> list[Episode]:
     groups: list[tuple[int, int, set, set]] = []
     for first, end, pair in sorted(spans):
         bodies, pairs = set(pair), {pair}
-        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # joined groups may meet more
+        while met := [g for g in groups if g[0] < end and first < g[1] and g[2] & bodies]:  # may meet more
             groups = [g for g in groups if not any(g is other for other in met)]
             for low, high, others, theirs in met:
                 first, end, bodies, pairs = min(first, low), max(end, high), bodies | others, pairs | theirs

@@ -106,7 +106,7 @@ def run(
         tasks: (key, arguments), taken one by one when a worker is free.
         work: a function of a module, which other processes can import by name.
         config: where the work runs.
-        cancelled: asked now and then.
+        cancelled: called now and then; True cancels the work.
         report_result: receives each `TaskResult`.
     Returns:
         An iterator over (key, result); the result is a `TaskFailure` if `work` raises. Closing it, or an error, stops

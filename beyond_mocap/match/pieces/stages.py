@@ -47,7 +47,7 @@ class Job:
         library: the library in this process.
         workers: where work runs.
         report: receives the share of the stage done and a text.
-        cancelled: asked now and then.
+        cancelled: called now and then; True cancels the work.
     """
 
     order: MatchOrder

@@ -76,8 +76,8 @@ def searched(library: Library, unit: Unit, cancelled: Callable[[], bool] | None 
         library: the clips. If the plan allows synthetic clips, all windows get them, so that neighbours choose from the
             same ones.
         unit: the window.
-        cancelled: asked now and then.
-        hurry: asked now and then; True shortens the search.
+        cancelled: called now and then; True cancels the work.
+        hurry: called now and then; True shortens the search.
     Returns:
         The result.
     Raises:
