@@ -180,7 +180,8 @@ def cut(state: Path, drop: str = "") -> None:
 
 @pytest.mark.parametrize("drop, told", [
     ("", "not valid JSON"), ("players", "no list of players"), ("digest", "no digest"),
-                                        ("version", "no version")])  # fmt: skip
+    ("version", "no version"),
+])  # fmt: skip
 def test_a_damaged_state_is_set_aside_and_the_work_goes_on(order, begun, drop, told):
     cut(order.out / "match.json", drop)
     damaged = (order.out / "match.json").read_bytes()
