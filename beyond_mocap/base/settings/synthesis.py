@@ -65,9 +65,9 @@ TABLES = {
             panel_more=dict(unit="LENGTH", subtype="DISTANCE")),
         Setting(name="omega", default=0.0, least=0.0, most=100.0, expected=BETWEEN, option="--omega", metavar="NUMBER",
             help="the faster of two gaits begins at 1/omega of the range between their speeds; 0: as the recordings "
-            "are labelled ('path'), else 4; default %(default)g", title="Gait Threshold", tooltip="The faster of two gaits "
-            "begins at 1 / this value of the range between their speeds; 0 takes it from the recordings' labels (Path "
-            "Following) or a quarter of the range", precision=1, in_preset=True, tuning="any"),
+            "are labelled ('path'), else 4; default %(default)g", title="Gait Threshold", tooltip="The faster of two "
+            "gaits begins at 1 / this value of the range between their speeds; 0 takes it from the recordings' labels "
+            "(Path Following) or a quarter of the range", precision=1, in_preset=True, tuning="any"),
         Setting(name="seam_window", default=0.8, least=0.0, most=4.0, unit="seconds", expected=BETWEEN,
             option="--seam-window", help="window over which a transition is blended; default %(default)g",
             title="Transition Window", tooltip="Time over which the transition between two clips is blended",
