@@ -30,7 +30,7 @@ def gaps(made: Passes) -> tuple[np.ndarray, np.ndarray]:
     """Measure the strikes of a passing scene that touch the ball.
 
     Args:
-        made: the scene's result.
+        result: the scene's result.
     Returns:
         (K,) m between the surfaces of part and ball, by the pose played there and the ball as written; (K,) m from that
         ball to where the flight before was to arrive.

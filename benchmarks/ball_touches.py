@@ -298,7 +298,7 @@ def scored(times: Sequence[float], players: Sequence[str], reading: Reading, tol
 
 def scored_by_events(times: Sequence[float], players: Sequence[str], reading: Reading, tolerance: float = TOLERANCE,
                      most: float = 4.0) -> Score:
-    """Compare with the one offset, up to `most` seconds either way, that gives the highest F1."""
+    """Compare with the one offset, up to `max_offset` seconds either way, that gives the highest F1."""
     coarse = np.arange(-most, most + 1e-9, tolerance / 2.0)
     best = max(coarse, key=lambda offset: _roughly(times, players, reading, tolerance, offset))
     fine = best + np.arange(-tolerance / 2.0, tolerance / 2.0 + 1e-9, 0.01)

@@ -101,7 +101,7 @@ def walkabout(length: float = 30.0, seed: int = 3, tightest: float = 2.0) -> np.
 
 
 def hill(degrees: float, way: float = 4.0, length: float = 30.0) -> np.ndarray:
-    """Build hills: up for `way` m over the ground, over the top and down again, and so on.
+    """Build hills: up for `distance` m over the ground, over the top and down again, and so on.
 
     Slopes are `degrees` except for 1 m around tops and valleys.
     """

@@ -89,7 +89,7 @@ def edit_times(library: Library, orders: Iterable[tuple[Track, Timeline]], runs:
 
     Args:
         library: the clips.
-        orders: (track, timeline) of each.
+        requests: (track, timeline) of each.
         runs: the best of so many runs counts.
     Returns:
         Lines of Markdown.

@@ -46,7 +46,7 @@ class Steps:
         """Begin the progress bar.
 
         Args:
-            told: the command line's progress bar.
+            reporter: the command line's progress bar.
             shares: part -> share of the time it takes.
         """
         self.told, self.shares, self.done, self.now = told, shares, 0.0, ""

@@ -131,7 +131,7 @@ def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
             taken[row, column] = int(np.argmin(ways))
             best[row, column] = min(ways)
     row, column, moved = len(keys), len(mine), keys[:]
-    # trace back from the last cell: 0 goes up, 1 goes left, 2 goes both
+    # trace back from the last cell: 0 moves up, 1 moves left, 2 moves both
     while row:
         way = taken[row, column]
         if way == 2:

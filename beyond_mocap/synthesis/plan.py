@@ -70,7 +70,7 @@ class Touched:
 
     Attributes:
         time: s.
-        mine: whether it was this player, None where no tracked player was near.
+        is_own: whether it was this player, None where no tracked player was near.
         part: "foot", "head", "chest", "hand", or "" where that is not known.
         kind: a label such as "kick" or "receive".
     """
@@ -209,7 +209,7 @@ def sample_with_course(track: Track, course: SolvedCourse | None, fps: float, wi
 
     Args:
         track: the track.
-        course: the ball's trajectory, None without one.
+        trajectory: the ball's trajectory, None without one.
         fps: frames per second.
         window: s, of the window that removes the feed's jitter.
     """
@@ -230,10 +230,10 @@ class ResolvedPlan:
     """A plan with its touches resolved, in the size of the library's skeleton.
 
     Attributes:
-        asked: the plan as requested; its settings hold as they are, its pins are in the player's size.
+        requested: the plan as requested; its settings hold as they are, its pins are in the player's size.
         timeline: the requested annotations, not yet filled, with key moments at the touches that they mean.
         track: the player's samples, m in the library's size.
-        course: the ball's trajectory, m in the player's size; None where it is not solved.
+        trajectory: the ball's trajectory, m in the player's size; None where it is not solved.
         size: how many times as tall as the library's skeleton the player is.
     """
 

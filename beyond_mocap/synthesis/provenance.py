@@ -104,7 +104,7 @@ def provenance_fields(library: Library, shown: Shown) -> dict[str, Any]:
 
     Args:
         library: the clips.
-        shown: T source frames.
+        frames_shown: T source frames.
     """
     sources = sources_shown(library, shown)
     names = tuple(dict.fromkeys(sources))

@@ -26,8 +26,9 @@ def resolve_plan(
     Args:
         plan: the plan.
         library: the clips.
-        course: the ball's trajectory, where an earlier take of the same track has it.
-        touches_solved: whether the plan's key moments are at its touches already (`resolved_touches.resolve_touches`).
+        trajectory: the ball's trajectory, where an earlier take of the same track has it.
+        are_touches_resolved: whether the plan's key moments are at its touches already
+            (`resolved_touches.resolve_touches`).
     """
     known = plan if touches_solved else solve_touches(plan, course)
     size = plan.height / stature(library.skeleton) if plan.height else 1.0

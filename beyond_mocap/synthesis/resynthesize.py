@@ -86,7 +86,7 @@ def resynthesize(
         plan: the changed plan.
         before: the take before the change.
         progress, cancelled, hurry: as for `synthesize`.
-        anew: a stretch of which another solution is requested, whether or not its plan has changed.
+        variant: a stretch of which another solution is requested, whether or not its plan has changed.
     Raises:
         InputError: where that stretch lies outside the take, or for another method than "path".
         NotInLibraryError, CancelledError: as for `synthesize`.
@@ -244,7 +244,7 @@ class _Update:
             before: the old take, in the library's size.
             track: the track at the output's rate.
             edit: the new edit list.
-            order: the new request.
+            request: the new request.
         """
         self.library, self.plan, self.before = library, plan, before
         self.track, self.edit, self.order = track, edit, order

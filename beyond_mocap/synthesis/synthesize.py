@@ -68,7 +68,7 @@ class Found:
     Attributes:
         edit: the edit list, at the library's rate.
         travelled: (T,) m travelled where the method decides it, else None.
-        hurried: frame from which on it was searched in a hurry, None if it was not.
+        hurried_from: frame from which on it was searched in a hurry, None if it was not.
     """
 
     edit: EditList
@@ -99,8 +99,8 @@ def synthesize(
         plan: the request.
         progress: called as progress(fraction, text).
         cancelled: returns whether to stop.
-        hurry: returns whether to finish early: method "path" then keeps what it has found, searches the rest quickly,
-            and the take's warnings say from which second on; before anything is found, and by the other methods, this
+        hurry: returns whether to finish early: method "path" then keeps what it has found, searches the rest
+            quickly, and the take's warnings say from which second on; before anything is found, and by the other methods, this
             cancels.
         used: source frames that another solution avoids where it can (method "path"; the others differ by their seed).
         narrow: whether method "path" searches quickly from the start.
@@ -218,10 +218,10 @@ def finished(
         take: in the library's size.
         plan: the resolved plan.
         recordings: the library without synthetic clips.
-        order: the request.
-        hurried: frame at the library's rate from which on the search was cut short, None if it was not.
+        request: the request.
+        hurried_from: frame at the library's rate from which on the search was cut short, None if it was not.
         before: the finished take that it is an edit of.
-        judged: whether unmet constraints are reported.
+        report_unmet: whether unmet constraints are reported.
     """
     take = with_pins(in_own_size(take, plan.size, plan.asked, before), recordings)
     begun = time.perf_counter()
@@ -267,10 +267,10 @@ def with_warnings(
     Args:
         take: the take.
         recordings: the library without synthetic clips.
-        order: the request.
-        hurried: frame at the library's rate from which on the search was cut short, or None.
+        request: the request.
+        hurried_from: frame at the library's rate from which on the search was cut short, or None.
         more: further lines.
-        judged: whether unmet constraints are reported.
+        report_unmet: whether unmet constraints are reported.
     """
     told = [*recordings.notes, *order.warnings, *more, *_crowded_out(order, take.edit)]
     if take.plan.method == "path":  # the other methods leave out no part of a clip

@@ -21,7 +21,7 @@ class KeyResult:
     """How one key moment was served.
 
     Attributes:
-        asked: the key moment of the timeline.
+        requested: the key moment of the timeline.
         frame: output frame, fractional, where the clip's key frame is played.
         clip: path below the library.
         clip_frame: key frame in the clip's own rate.
@@ -99,11 +99,11 @@ class Take:
         plan: the request.
         edit: what the search chose, at the library's rate, for `resynthesize`.
         pins: how the pins were met.
-        cut_short: whether part of it was searched in a hurry.
+        is_cut_short: whether part of it was searched in a hurry.
         unpinned: motion and contacts without pins, None where there are none.
         solved: the ball's trajectory where it was solved.
-        met_ball: the ball as it was met, before it was led along that trajectory, None where it was not.
-        dribbled: the touches of dribbles.
+        contact_ball: the ball as it was met, before it was led along that trajectory, None where it was not.
+        dribble_touches: the touches of dribbles.
     """
 
     motion: Motion

@@ -149,7 +149,7 @@ def swing_to(body: Body, chain: tuple[int, int, int], at: int, place: np.ndarray
         chain: upper, middle and end joint.
         at: frame of the body.
         place: (3,) m, world, target of the end joint.
-        most: rad, largest turn about the upper joint.
+        max_turn: rad, largest turn about the upper joint.
         lowered: m by which the upper joint sinks.
     Returns:
         The swing, its angles within MIN_ANGLE and MAX_ANGLE.

@@ -60,8 +60,8 @@ class Construction:
         touches: where the body may meet the ball, in frames of the track.
         heading: (T,) rad that is given, NaN where it is free; None where nothing is given.
         old: the motion that stays at both ends, None for none.
-        faces_ball: whether the body turns so that the striking part points at the ball.
-        planned: whether the track is a planned path: it is kept exactly, the heading is given in all frames, and the
+        turns_to_ball: whether the body turns so that the striking part points at the ball.
+        is_planned: whether the track is a planned path: it is kept exactly, the heading is given in all frames, and the
             body does not lean more than its source does.
     """
 
@@ -109,7 +109,7 @@ class Construction:
 
         Args:
             planted: the body of `construct_body`.
-            taken: its steps.
+            steps_taken: its steps.
         Returns:
             The body and the ball's centre (T, 3) m, both in the library's size.
         """
@@ -180,7 +180,7 @@ class Construction:
 
         Args:
             root: (T, 3) m, world.
-            taken: the steps.
+            steps_taken: the steps.
             free: (T,) 1 where the body may yield, 0 where it must stay.
         Returns:
             Root (T, 3) m and local rotations (T, J, 4).
@@ -254,9 +254,9 @@ def key_results(library: Library, fps: float, order: Wanted, edit: EditList, pla
     Args:
         library: the clips.
         fps: output frames per second.
-        order: the request.
+        request: the request.
         edit: the edit list, at the library's rate.
-        played: the source frames shown, at `fps`.
+        shown_frames: the source frames shown, at `fps`.
     """
     return tuple(_key_result(library, fps, order, edit=edit, played=played, number=number)
                  for number in range(len(order.keys)))

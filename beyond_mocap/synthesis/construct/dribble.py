@@ -47,13 +47,13 @@ def dribble(
         skeleton: the skeleton.
         root: (T, 3) m, the motion on the pitch, which does not change.
         rotations: (T, J, 4) local.
-        standing: (T, 2) bool, left and right foot in contact with the ground.
+        foot_contacts: (T, 2) bool, left and right foot in contact with the ground.
         ball: (T, 3) m, its centre, world, NaN where it is unknown.
         stretches: first and last frame of each dribble, fractional.
         held: first and last frame of each touch at a key moment.
         fps: frames per second.
         measured: (T,) bool, False where a sample has no weight.
-        turns: frames outside the stretches at which the ball is known to change its course.
+        course_changes: frames outside the stretches at which the ball is known to change its course.
     Returns:
         The trajectory and the touches of all dribbles.
     """

@@ -72,8 +72,8 @@ class Between:
     Attributes:
         low: first frame.
         high: last frame.
-        starts: whether the ball is met at the first frame.
-        ends: whether the ball is met at the last frame.
+        is_met_at_start: whether the ball is met at the first frame.
+        is_met_at_end: whether the ball is met at the last frame.
     """
 
     low: int
@@ -207,7 +207,7 @@ class Search:
             skeleton: the skeleton.
             root: (T, 3) m, world.
             rotations: (T, J, 4) local.
-            standing: (T, 2) bool, left and right foot in contact.
+            foot_contacts: (T, 2) bool, left and right foot in contact.
             path: (T, 3) m, the ball's centre.
             measured: (T,) bool, False where a sample has no weight.
             part: the frames to search.
@@ -305,10 +305,10 @@ class Search:
         self.arrives = np.zeros((count, 2))  # m/s of the ball at the end of the cheapest roll
         self.best, self.last = np.inf, _START
         self.sources = [_START] if self.part.starts else []
-        if not count:  # no foot comes near: the ball rolls all the way, if it is met at both ends
+        if not count:  # no foot comes near: the ball rolls from end to end, if it is met at both
             return self._path() if self.part.starts and self.part.ends else None
         if not self.part.starts:
-            # an open beginning: any touch soon after it may be the first; what goes before follows the samples
+            # an open beginning: any touch soon after it may be the first; before that the ball follows the samples
             soon = np.flatnonzero(self.frame <= _FROM_END * self.fps)
             self.into[soon] = _WAIT_COST * self.frame[soon] / self.fps + _FIT_COST * self._off(soon)
             self.into[soon] += np.append(0.0, np.cumsum(self._untouched()))[self.frame[soon]]
@@ -358,7 +358,7 @@ class Search:
             self.best, self.last = whole.min(), int(np.argmin(whole))
 
     def _push(self, node: int) -> None:
-        """Find the cheapest way for the ball to be at this foot: it rolled here, or is pushed since a few frames."""
+        """Find the cheapest push that ends here: the ball has just rolled here, or has been pushed for a few frames."""
         longest = int(_PUSH_SECONDS * self.fps)
         ago = self.frame[node] - self.frame
         since = np.flatnonzero(self._alike(node) & (ago >= 0) & (ago <= longest))[::-1]

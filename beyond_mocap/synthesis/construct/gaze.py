@@ -77,7 +77,7 @@ def head_angles(seen: np.ndarray) -> np.ndarray:
 
 
 def _limited(angle: np.ndarray, most: float) -> np.ndarray:
-    """Limit angles (N,) softly to `most`: up to three quarters of it they do not change."""
+    """Limit angles (N,) softly to `limit`: up to three quarters of it they do not change."""
     free = 0.75 * most
     over = np.maximum(np.abs(angle) - free, 0.0)
     return np.sign(angle) * (np.minimum(np.abs(angle), free) + (most - free) * np.tanh(over / (most - free)))

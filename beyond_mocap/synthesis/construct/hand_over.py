@@ -3,7 +3,7 @@
 Around the stretch both motions show the same source frames, but what was solved over all frames (how far a foot is
 shifted, how low the pelvis is) may differ there by some centimetres. Root and joints are blended within the hand-over;
 feet change over at once where they are in the air. A foot in contact at the border stays where the old motion has it
-until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all. Where both motions stand still at
+until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all. Where both motions stay in place at
 different places, the feet step over (`step_over`).
 """
 
@@ -69,7 +69,7 @@ class OldMotion:
         return heading
 
     def turned_alike(self, track: SampledTrack, heading: np.ndarray) -> SampledTrack | None:
-        """Change the track's direction so that a body turns the same way round as the old one.
+        """Change the track's direction so that a body turns in the same sense as the old one.
 
         Args:
             track: W frames.
@@ -149,7 +149,7 @@ def handed_over(skeleton: Skeleton, new: Pose, old: Pose, share: np.ndarray, sta
         new: root (T, 3) m and local rotations (T, J, 4) where the share is 0.
         old: the same where the share is 1; not used where it is 0.
         share: (T,) of the old motion.
-        standing: (T, 2, 2) bool, heel and toe of the left and right foot in contact.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe of the left and right foot in contact.
         fps: frames per second.
     Returns:
         Root (T, 3) m and local rotations (T, J, 4).
@@ -178,7 +178,7 @@ def stepped_over(skeleton: Skeleton, pose: Pose, standing: np.ndarray, stretch: 
     Args:
         skeleton: the skeleton.
         pose: root (T, 3) m and local rotations (T, J, 4).
-        standing: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts of the motion that is shown most.
         stretch: first and end frame.
         fps: frames per second.
     Returns:

@@ -35,8 +35,8 @@ class Room:
     """How far the ball may be moved.
 
     Attributes:
-        whole: m, in all.
-        upright: m of that, up or down.
+        total: m, in all.
+        vertical: m of that, up or down.
     """
 
     whole: float
@@ -81,7 +81,7 @@ def best_aim(
         direction: (3,) level, unit, where the part strikes.
         rise: sine of the ball's elevation as seen from the part.
         ball: (3,) m as measured.
-        room: how far the ball may be moved.
+        ball_range: how far the ball may be moved.
         avoid: (line, radius) of parts that the ball must not lie in.
         possible: returns, for a move (3,) m of the part, the move that the body can make.
     """
@@ -118,7 +118,7 @@ def meetings(
         aims: N aims.
         rise: sine of the ball's elevation as seen from the part.
         ball: (3,) m as measured.
-        room: how far the ball may be moved.
+        ball_range: how far the ball may be moved.
         avoid: (line, radius) of parts that the ball must not lie in.
     """
     along = np.array([aim.along for aim in aims])[:, None]
@@ -145,7 +145,7 @@ def meetings(
 
 
 def _within(way: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Limit level moves (N, 2) m to lengths `most` (N,) m."""
+    """Limit level moves (N, 2) m to lengths `limit` (N,) m."""
     return way * np.minimum(1.0, most / np.maximum(np.linalg.norm(way, axis=1), 1e-12))[:, None]
 
 
@@ -178,7 +178,7 @@ def held_meeting(hands: np.ndarray, radius: float, ball: np.ndarray, room: Room)
         hands: (2, 2, 3) m, ends of the line of each hand.
         radius: m of a hand.
         ball: (3,) m as measured.
-        room: how far the ball may be moved.
+        ball_range: how far the ball may be moved.
     Returns:
         Its place (3,) m, and what each hand has to move (2, 3) m to touch it.
     """

@@ -1,4 +1,4 @@
-"""Place a motion on a track: which way the body faces, where its root is and how it leans, at every frame.
+"""Place a motion on a track: its heading, root and lean, at every frame.
 
 The body's own sway about its path is kept: the root is the track plus the sway, turned with the body. Heading is not
 the direction of travel; the angle between the two that the recording had is kept. At a touch the body turns so that
@@ -73,7 +73,7 @@ def facing(
         speed: (T,) m/s on the track.
         velocity: (T, 2) m/s of the recording in its facing frame.
         turn: (T,) rad that the recording turned since the frame before.
-        kept: (T,) rad that the heading has to be, NaN where it is free.
+        given: (T,) rad that the heading has to be, NaN where it is free.
         firm: (T,) how many times firmer than usual the recording's turning is followed (`turning_firmness`).
         aim: (T,) rad that a body in place turns to slowly.
     Returns:
@@ -114,7 +114,7 @@ def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np
     1.
 
     Args:
-        standing: (T, 2, 2) bool, heel and toe contacts.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
         height: (T,) m of the root.
         fps: frames per second.
     Returns:
@@ -239,16 +239,16 @@ def missing_lean(
     speed: np.ndarray, direction: np.ndarray, velocity: np.ndarray, turn: np.ndarray, seams: np.ndarray, fps: float,
     slow: tuple[float, float] = UPRIGHT_SPEED,
 ) -> np.ndarray:
-    """Compute the lean that the track asks for beyond what the recording had, limited softly.
+    """Compute the lean that the track needs beyond what the recording has, limited softly.
 
     Args:
         speed: (T,) m/s on the track.
         direction: (T,) rad, of travel on the track.
         velocity: (T, 2) m/s of the recording in its facing frame.
         turn: (T,) rad that the recording turned since the frame before.
-        seams: (S,) frames of transitions, across which a recording's direction says nothing.
+        transitions: (S,) frames of transitions, across which a recording's direction says nothing.
         fps: frames per second.
-        slow: m/s, as UPRIGHT_SPEED.
+        upright_speed: m/s, as UPRIGHT_SPEED.
     Returns:
         (T,) lateral acceleration over g, to the left; legs get at most MAX_LEAN, nothing below UPRIGHT_SPEED.
     """
@@ -324,7 +324,7 @@ def absorb_foot_slide(
         skeleton: the skeleton.
         root: (T, 3) m, world.
         rotations: (T, J, 4) local, the constructed motion.
-        standing: (T, 2, 2) bool, heel and toe contacts.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
         fps: frames per second.
     Returns:
         (T, 2) m by which the root moves, and (T,) rad by which the body turns about it.

@@ -63,7 +63,7 @@ class Target:
     Attributes:
         share: (T,) of the pin at each frame, 1 where it holds and 0 where there is none.
         place: (T, 3) m of the pin, of the next or last one where the share is below 1.
-        stays: the pins, in order of time.
+        pins: the pins, in order of time.
     """
 
     share: np.ndarray

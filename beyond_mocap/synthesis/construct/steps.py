@@ -58,7 +58,7 @@ class Steps:
 
     Attributes:
         rotations: (T, J, 4) local, with lifts left out.
-        standing: (T, 2, 2) bool, heel and toe of each foot that are in contact now.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe of each foot that are in contact now.
         contacts: (T, 2) bool, feet flat on the ground, as in the source.
         stepped: (T, 2) bool, feet in an extra step, from heel off to heel down.
         moves: (T, 2, 4), m by which each foot is moved, and rad of heel over toe.
@@ -78,7 +78,7 @@ class Steps:
 
         Args:
             rotations: (T, J, 4) local.
-            standing: (T, 2, 2) bool, heel and toe contacts.
+            heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
         """
         nothing = np.zeros((len(standing), 2))
         return Steps(rotations=rotations, standing=standing, contacts=standing.all(axis=2), sway=nothing,
@@ -95,9 +95,9 @@ def steps(
         skeleton: the skeleton.
         root: (T, 3) m, world.
         rotations: (T, J, 4) local.
-        standing: (T, 2, 2) bool, heel and toe contacts, left and right.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts, left and right.
         fps: frames per second.
-        given: (T, 2) bool, steps that are taken already.
+        steps_taken: (T, 2) bool, steps that are taken already.
         free: (T,) bool, where others may be added; None: everywhere.
     """
     none = Steps.none(rotations, standing)
@@ -134,8 +134,8 @@ class _Foot:
         points: (T, 2) m, ankle and toe.
         middle: (T,) m between them.
         yaw: (T,) rad, direction of the foot, unwrapped.
-        stands: (T,) bool, in contact.
-        flat: (T,) bool, in contact with heel and toe.
+        is_in_contact: (T,) bool, in contact.
+        is_flat: (T,) bool, in contact with heel and toe.
         held: (T,) bool, kept down although the source lifts it.
         before, behind: (T,) frames between whose places a held foot is.
         through: (T,) how far it is from the one to the other, 0 to 1.
@@ -233,10 +233,10 @@ class _Plan:
 
     Attributes:
         feet: left and right foot, with lifts left out.
-        stands: (T, 2) bool, in contact after the steps.
+        contacts: (T, 2) bool, in contact after the steps.
         stepped: (T, 2) bool, in a step.
         lag: (T, 2), how far each foot lags; 1 where a step is due.
-        left: per foot the stances (first, end) that still drag too far.
+        dragged_stances: per foot the stances (first, end) that still drag too far.
     """
 
     def __init__(self, feet: list[_Foot], given: np.ndarray, speed: np.ndarray, fps: float, free: np.ndarray):

@@ -238,7 +238,7 @@ class _Scene:
         return np.array([body.line(part, frame - self.origin) for part in self.parts])
 
     def ball_and_needs(self, lines: np.ndarray, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Compute where the ball goes (3,) m, and what each part then lacks (P, 3) m to touch it.
+        """Compute the new place of the ball (3,) m, and what each part then lacks (P, 3) m to touch it.
 
         Args:
             lines: (P, 2, 3) m, the parts' lines.
@@ -368,7 +368,7 @@ def _flat(v: np.ndarray) -> np.ndarray:
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
     """Bring the parts of a body to the ball, within their reach; also return how far they were moved, m.
 
-    Requests and what the body makes of them are solved in turns, since a nearly straight limb yields softly and a spine
+    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a spine
     moves on an arc.
     """
     own = scene.lines(body, scene.moment.frame)

@@ -78,9 +78,9 @@ def met_at(motion: Motion, standing: np.ndarray, meetings: Sequence[Meeting], gr
 
     Args:
         motion: T frames.
-        standing: (T, 2) bool, left and right foot in contact.
-        meetings: K strikes.
-        grounded: whether the ground is at height 0 and no foot goes through it.
+        foot_contacts: (T, 2) bool, left and right foot in contact.
+        strikes: K strikes.
+        has_ground: whether the ground is at height 0 and no foot goes through it.
     """
     root, rotations = np.array(motion.root_positions), np.array(motion.rotations)
     gap, moved = np.full(len(meetings), np.nan), np.full(len(meetings), np.nan)

@@ -63,7 +63,7 @@ def root_at_distance(track: SampledTrack, smooth: Footage, travelled: np.ndarray
 
     Args:
         track: T frames.
-        smooth: T source frames without jumps.
+        smooth_source: T source frames without jumps.
         travelled: (T,) m.
     Returns:
         Heading (T,) rad and root (T, 2) m, world.
@@ -103,7 +103,7 @@ def root_by_integration(
     Args:
         library: the clips.
         source: T source frames.
-        smooth: the same without jumps.
+        smooth_source: the same without jumps.
         track: T frames.
     Returns:
         Heading (T,) rad and root (T, 2) m, world.
@@ -144,7 +144,7 @@ def torso_corrections(up: np.ndarray, seams: np.ndarray, expected: np.ndarray) -
 
     Args:
         up: (T, 3) unit, direction of the torso (hips to neck) in the facing frame.
-        seams: (S,) frames of transitions.
+        transitions: (S,) frames of transitions.
         expected: (S, 3) unit, the same for the frame with which the piece before would continue.
     Returns:
         (S,) rad.

@@ -55,7 +55,7 @@ def faded_rotations(
 ) -> np.ndarray:
     """Blend rotations with those of the other piece by their `compute_blend_share`.
 
-    A joint turns the same way round throughout a blend: two swinging arms may be half a turn apart, and the shorter arc
+    A joint turns in the same sense throughout a blend: two swinging arms may be half a turn apart, and the shorter arc
     of each frame alone would change sides in the middle. The side is the one that is shorter in the mean over the
     blend.
 
@@ -87,7 +87,7 @@ def _steady_arc(turn: np.ndarray, through: np.ndarray) -> np.ndarray:
     flips = np.sum(turn * np.roll(turn, 1, axis=0), axis=-1) < 0.0
     turn = turn * np.where(np.cumsum(flips & ~begins[:, None], axis=0) % 2 == 1, -1.0, 1.0)[..., None]
     fade = np.cumsum(begins) - 1
-    # sum of the scalar parts per blend and joint: negative means that the long way round is the mean
+    # sum of the scalar parts per blend and joint: negative means that the long arc is the mean
     middle = np.zeros((begins.sum(), turn.shape[1]))
     np.add.at(middle, fade, turn[..., 0])
     turn = turn * np.where(middle < 0.0, -1.0, 1.0)[fade][..., None]
@@ -119,7 +119,7 @@ def spread_reaches(seams: np.ndarray, count: int, longest: float = LONGEST_SPREA
     """Compute the reach of each transition: half of the shorter neighbouring piece, so that windows never overlap.
 
     Args:
-        seams: (S,) frames of transitions.
+        transitions: (S,) frames of transitions.
         count: number of frames.
         longest: frames, limit.
     Returns:
@@ -136,7 +136,7 @@ def spread_values(
 
     Args:
         values: (T, ...).
-        seams: (S,) frames of transitions.
+        transitions: (S,) frames of transitions.
         ahead: (S, ...), what the frame at each transition would have been if the piece before had continued.
         longest: frames, limit of the reach.
     Returns:
@@ -160,7 +160,7 @@ def spread_rotations(
 
     Args:
         rotations: (T, J, 4).
-        seams: (S,) frames of transitions.
+        transitions: (S,) frames of transitions.
         ahead: (S, J, 4), the pose if the piece before had continued.
         longest: frames, limit of the reach.
     Returns:

@@ -51,7 +51,7 @@ def give_way(
         timeline: the requested timeline, for the key moments.
         library: the recordings, without synthetic clips.
         ik_miss: (T, 2) m that each leg was short of where its foot should be.
-        asked: the user's own labels, where `timeline` has automatic ones beside them.
+        user_timeline: the user's own labels, where `timeline` has automatic ones beside them.
     Returns:
         A line for each kind.
     """

@@ -22,7 +22,7 @@ class Moment:
     """How one key moment was served.
 
     Attributes:
-        asked: the key moment of the timeline.
+        requested: the key moment of the timeline.
         frame: output frame nearest to its resolved time (the requested or the solved one).
         clip: path of the clip, None where no key of a clip is played there.
         clip_frame: the clip's key frame, in its own rate, None as above.

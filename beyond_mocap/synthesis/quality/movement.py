@@ -134,7 +134,7 @@ def speed_coverage(wanted: np.ndarray, fastest: float, slowest: float, reach=(0.
     """Measure the shares of frames with a speed that the library cannot play within the warp limits.
 
     Args:
-        wanted: (T,) m/s of the track.
+        requested: (T,) m/s of the track.
         fastest: m/s, fastest root of the library.
         slowest: m/s, slowest gait of the library.
         reach: warp limits.
@@ -204,7 +204,7 @@ def seam_ratios(values: np.ndarray, seams: np.ndarray, speed: np.ndarray, real: 
 
     Args:
         values: (T-3,) m/s^3.
-        seams: (S,) frames of transitions.
+        transitions: (S,) frames of transitions.
         speed: (T,) m/s.
         real: (5,) m/s^3 of `compute_real_p95`.
     Returns:
@@ -368,7 +368,7 @@ def planted_shift(feet: np.ndarray, wanted: np.ndarray, contacts: np.ndarray) ->
 
     Args:
         feet: (T, 2, 2, 3) m.
-        wanted: (T, 2, 2, 3) m.
+        placed: (T, 2, 2, 3) m.
         contacts: (T, 2) bool.
     Returns:
         (N,) m.

@@ -43,7 +43,7 @@ class AnnotationCost:
         Args:
             start: (M,) first library frame of each block; a block that reaches beyond the library's frames counts as
                 its last frame there.
-            asked: requested labels of each of the block's frames, None where any will do.
+            requested: requested labels of each of the block's frames, None where any will do.
         Returns:
             (M,) D, -1 to 1.
         """

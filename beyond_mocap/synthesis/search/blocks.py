@@ -94,7 +94,7 @@ class BlockSearch:
 
     Attributes:
         library: the clips.
-        wanted: the request.
+        request: the request.
         alpha: weight of labels against continuity, eq. 13.
         scale: length that makes continuity costs comparable.
         key_in_slot: slot -> (number of the key moment, library key) that its block shows, after `run`.
@@ -112,7 +112,7 @@ class BlockSearch:
 
         Args:
             library: the clips.
-            wanted: the request.
+            request: the request.
             alpha: weight of labels against continuity.
             progress: called as progress(fraction, text).
             cancelled: returns whether to stop.
@@ -262,7 +262,7 @@ class BlockSearch:
 
         Args:
             length: frames of a block.
-            offered: candidates of each slot.
+            candidate_lists: candidates of each slot.
         """
         slots, unary, keys = [], [], []
         for slot, candidates in enumerate(offered):

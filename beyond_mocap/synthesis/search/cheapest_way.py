@@ -68,13 +68,13 @@ class Ways:
     def cheapest(self, to: Offered, known: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Find the cheapest transition to each candidate that may be kept.
 
-        Of candidates that begin no piece, those are left out that cannot be among the `most` cheapest of them and of
-        `known`.
+        Of candidates that begin no piece, those are left out that cannot be among the `kept_count` cheapest of them and
+        of `known`.
 
         Args:
             to: K candidates.
             known: (L,) costs of other ways to fill the slot.
-            most: how many the beam keeps.
+            kept_count: how many the beam keeps.
         Returns:
             Numbers of the candidates (k,), costs (k,), and the states (k,) before them.
         """
@@ -122,8 +122,8 @@ class Ways:
 
         Args:
             to: K candidates.
-            least: (K, B) lower bounds.
-            pairs: (P,) flat indices into `least`.
+            lower_bound: (K, B) lower bounds.
+            pairs: (P,) flat indices into `lower_bound`.
         Returns:
             (P,) float32, above the base.
         """

@@ -96,7 +96,7 @@ def edit_list(library: Library, clip: np.ndarray, frame: np.ndarray, keys: tuple
 
 
 def _move(library: Library, clip, frame, seam: int, low: int, high: int) -> None:
-    """Move one transition within low < seam < high, in place."""
+    """Move one transition within low < transition < high, in place."""
     shifts = [s for s in range(-REACH, REACH + 1) if low < seam + s < high]
     before, after = (clip[seam - 1], frame[seam - 1]), (clip[seam], frame[seam])
     costs = [_gap(library, before, after, s) for s in shifts]
@@ -155,7 +155,7 @@ def warped_edit(search: BlockSearch, sections: list[Section], catching_up: bool)
     Args:
         search: the block search.
         sections: its blocks, with cycles added or removed.
-        catching_up: whether lost distance is regained.
+        regains_distance: whether lost distance is regained.
     Returns:
         The edit list, and (T,) m travelled by each output frame.
     """
@@ -249,7 +249,7 @@ def exact_keys(library: Library, edit: EditList, wanted) -> EditList:
     Args:
         library: the clips.
         edit: the edit list, at the library's rate.
-        wanted: the request.
+        request: the request.
     """
     frame = edit.frame.copy()
     for placed in edit.keys:

@@ -29,7 +29,7 @@ def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, lo
 
     Args:
         library: the clips.
-        wanted: the request.
+        request: the request.
         at: output frame of the key frame.
         key: the clip's key moment.
         rate: playback rate.
@@ -52,7 +52,7 @@ def undragged(
 
     Args:
         library: the clips.
-        wanted: the request.
+        request: the request.
         edges: (S + 1,) output frames of all slots.
         at: output frame of the key frame.
         key: the clip's key moment.
@@ -80,7 +80,7 @@ def left_out(library: Library, wanted: Wanted, edit: EditList) -> list[TimedLine
 
     Args:
         library: the recordings.
-        wanted: the request.
+        request: the request.
         edit: the edit list, at the library's rate.
     """
     told = []

@@ -16,7 +16,7 @@ class PlacedKey:
     """A key moment of the request with the library key that serves it.
 
     Attributes:
-        wanted: number of the key moment in the request.
+        number: number of the key moment in the request.
         key: the library's key moment.
     """
 
@@ -32,7 +32,7 @@ class EditList:
         clip: (T,) clip index.
         frame: (T,) fractional library frame; it may lie a few frames outside its clip at a transition, where the clip's
             end is held.
-        seams: (S,) frames that begin another piece.
+        transitions: (S,) frames that begin another piece.
         keys: the key moments that are shown.
     """
 

@@ -50,7 +50,7 @@ class Footage(Shown):
         sway: (T, 2) m from the clip's path to the root, facing frame.
         velocity: (T, 2) m/s of the path as played, facing frame.
         turn: (T,) rad of facing since the frame before, 0 at a transition.
-        standing: (T, 2, 2) bool, heel and toe contacts.
+        heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
         ahead_pose: (S, J, 4), the same for the frame that the piece before would have shown at each transition.
         ahead_height: (S,) m of it.
         ahead_sway: (S, 2) m of it.
@@ -100,7 +100,7 @@ def fetch(library: Library, edit: EditList, index: np.ndarray, rate: float) -> F
         library: the clips.
         edit: the edit list.
         index: (T,) fractional frames at the library's rate.
-        rate: output frames per second.
+        fps: output frames per second.
     """
     what = shown(library, edit, index)
     clip, frame, seams = what.clip, what.frame, what.seams

@@ -39,7 +39,7 @@ class Ball:
     Attributes:
         place: (2,) m from the player.
         height: m, NaN where it is not measured.
-        leaving: (2,) m/s just after.
+        exit_velocity: (2,) m/s just after.
     """
 
     place: np.ndarray
@@ -68,7 +68,7 @@ def ball_at(track: SampledTrack, frame: float, height_known: bool) -> Ball:
     Args:
         track: the sampled track.
         frame: fractional frame.
-        height_known: whether its height is measured.
+        is_height_known: whether its height is measured.
     """
     def at(second: float) -> np.ndarray:
         where = np.clip(frame + second * track.fps, 0, len(track.times) - 1)

@@ -37,7 +37,7 @@ class Section:
     Attributes:
         first: first slot of the output.
         end: slot after the last one.
-        locomotion: whether its frames request locomotion only.
+        is_locomotion: whether its frames request locomotion only.
         blocks: as many as slots or, in locomotion, more or fewer.
     """
 

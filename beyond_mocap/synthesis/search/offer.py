@@ -61,8 +61,8 @@ class Offer:
         valid: (R, N) bool, whether the clip lasts that long and is allowed.
         by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
         offset, long_stance: (N,), see `Pairs`.
-        made: (N,) bool, frames of synthetic clips.
-        stands: (N, 2) bool, feet in contact.
+        is_synthetic: (N,) bool, frames of synthetic clips.
+        is_in_contact: (N, 2) bool, feet in contact.
         wild_before, wild_after: (N,), see `measure_wildness`.
         bucket: (N,) int; frames of one bucket look alike when they are shown twice.
     """

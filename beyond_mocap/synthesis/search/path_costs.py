@@ -35,14 +35,14 @@ _CONTINUITY = ("switch", "pose", "rate_change")
 def cheapest(
     cost_of: Callable[[slice], np.ndarray], speeds: np.ndarray, speed: float, weight: float, looked_at: int, count: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find the `count` cheapest of the `looked_at` pairs nearest to a speed.
+    """Find the `count` cheapest of the `considered` pairs nearest to a speed.
 
     Args:
         cost_of: returns the costs (n,) of a slice of the pairs.
         speeds: (K,) m/s of the pairs, ascending.
         speed: m/s that is requested.
         weight: least cost of a metre per second of missed speed.
-        looked_at: how many pairs are considered.
+        considered: how many pairs are considered.
         count: how many are returned.
     Returns:
         Their numbers (k,), ascending, and costs (k,).
@@ -176,10 +176,10 @@ class PathCosts:
 
         Args:
             library: the clips.
-            wanted: the request.
+            request: the request.
             weights: cost of each misfit.
             used: source frames that another solution avoids where it can.
-            alike: another distance of poses than that of the features.
+            bone_distance: another distance of poses than that of the features.
         """
         self.library, self.wanted, self.weights = library, wanted, weights
         self.price = price(library, used) if used else None
@@ -233,7 +233,7 @@ class PathCosts:
 
         Args:
             first, end: output frames of the slot.
-            looked_at: how many pairs are considered.
+            considered: how many pairs are considered.
             count: how many are returned.
         Returns:
             number (K,), frame (K,), misfit (K,).
@@ -352,7 +352,7 @@ class PathCosts:
         """Generate the terms of cuts between library frames, by name, each (B, K) or broadcast to it.
 
         "pose" is the distance of the poses (and comes first); "left" and "cut" grow with the jerk that is left or
-        entered, since a transition cannot blend out of a kick half way.
+        entered, since a transition cannot blend out of the middle of a kick.
 
         Args:
             ends: (B,) last frame before the cut.

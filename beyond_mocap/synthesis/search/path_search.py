@@ -35,9 +35,9 @@ class Width:
     """How much a search evaluates.
 
     Attributes:
-        beam: states that are kept of every slot.
+        beam_width: states that are kept of every slot.
         candidates: pairs of library frame and playback rate that are weighed against them.
-        looked_at: pairs nearest to the requested speed among which these are the cheapest.
+        considered: pairs nearest to the requested speed among which these are the cheapest.
     """
 
     beam: int = 64
@@ -99,7 +99,7 @@ class PathSearch:
 
     Attributes:
         width: how much it evaluates.
-        hurried: output frame from which on a narrow beam searched, None if none did.
+        hurried_from: output frame from which on a narrow beam searched, None if none did.
         edges: (S + 1,) output frames of the slots.
         pieces: ways to serve the key moments.
         costs: the costs of the request.
@@ -124,15 +124,15 @@ class PathSearch:
 
         Args:
             library: the clips.
-            wanted: the request.
+            request: the request.
             weights: cost of each misfit.
             progress: called as progress(fraction, text).
             cancelled: returns whether to stop.
-            hurry: returns whether to finish early: the rest is searched by a narrow beam; before the first slot is
-                filled it ends the search as `cancelled` does.
-            between: search this stretch only and keep the rest.
+            hurry: returns whether to finish early: the rest is searched by a narrow beam; before the first slot
+                is filled it ends the search as `cancelled` does.
+            stretch: search this stretch only and keep the rest.
             used: source frames to avoid where that is possible.
-            alike: another distance of poses.
+            bone_distance: another distance of poses.
             on_grid: whether slots lie as in other searches of the same frames (`build_slot_edges`).
             narrow: whether the beam is narrow from the second slot on.
         """

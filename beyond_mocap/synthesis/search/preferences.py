@@ -50,12 +50,12 @@ AROUND = 0.25
 def off_style_cost(library: Library, style: Sequence[str], weight: float, warnings: list[str]) -> np.ndarray | None:
     """Compute the cost of library frames that are not of a style.
 
-    A frame is of the style if it carries one of its words as a label, or belongs to a clip that one of its patterns
+    A frame is of the style if it carries one of its labels, or belongs to a clip that one of its patterns
     names.
 
     Args:
         library: the clips, N frames.
-        style: words, or patterns of folders and clips.
+        style: labels, or patterns of folders and clips.
         weight: cost per slot.
         warnings: gets a line for a pattern that matches nothing.
     Returns:
@@ -92,7 +92,7 @@ def weak_foot_cost(asked: Iterable[str], choices: Sequence[Key], weak_foot: str)
     Nothing where the request names a side, where no foot meets the ball, or where no foot is preferred.
 
     Args:
-        asked: requested labels.
+        requested: requested labels.
         choices: K key moments of the library.
         weak_foot: "left", "right" or "".
     Returns:

@@ -2,7 +2,7 @@
 
 A key moment's clip is played for its own entry and exit (Faustino 2024, §3.2.2): from the last slot edge before the
 entry to the first one after the exit, at one playback rate, so that the key frame is on time; where its feet would be
-dragged, also without that part (`foot_drag`). Half way between two key moments that are close together lies an edge
+dragged, also without that part (`foot_drag`). Midway between two key moments that are close together lies an edge
 that neither crosses.
 """
 
@@ -33,7 +33,7 @@ class Pieces:
     """P ways to serve key moments, every choice at every playback rate.
 
     Attributes:
-        wanted: (P,) number of the key moment.
+        number: (P,) number of the key moment.
         choice: (P,) which of its choices.
         clip: (P,) clip index.
         rate: (P,) playback rate.
@@ -60,13 +60,13 @@ def slot_edges(
 ) -> np.ndarray:
     """Cut the output into slots of about SLOT frames.
 
-    There is an edge half way between key moments that are close together, and one before and after each where the
+    There is an edge midway between key moments that are close together, and one before and after each where the
     shortest of its clips begins and ends, so that a clip which does not fit its surroundings is not played longer than
     it must be; none of these leaves a slot shorter than SHORTEST beside it.
 
     Args:
         library: the clips.
-        wanted: the request.
+        request: the request.
         first: first output frame.
         end: frame after the last one; None for all.
         on_grid: whether edges lie at multiples of SLOT wherever key moments permit, so that searches of overlapping
@@ -108,7 +108,7 @@ def key_pieces(library: Library, wanted: Wanted, edges: np.ndarray) -> Pieces:
     inside = {number: slot_of(edges, wanted.keys[number].frame) for number in served}
     rows: list[tuple] = []
     for before, number, after in zip([None, *served], served, [*served[1:], None]):
-        # slots low .. high are free for this key moment: up to the edges half way to its neighbours
+        # slots low .. high are free for this key moment: up to the edges midway to its neighbours
         low = 0 if before is None else _edge_between(edges, wanted, before, number)
         high = len(edges) - 1 if after is None else _edge_between(edges, wanted, number, after)
         if low <= inside[number] < high:
@@ -149,5 +149,5 @@ def slot_of(edges: np.ndarray, frame: float) -> int:
 
 
 def _edge_between(edges: np.ndarray, wanted: Wanted, a: int, b: int) -> int:
-    """Return the number of the edge nearest to half way between two key moments."""
+    """Return the number of the edge nearest to the middle between two key moments."""
     return int(np.argmin(np.abs(edges - (wanted.keys[a].frame + wanted.keys[b].frame) / 2)))

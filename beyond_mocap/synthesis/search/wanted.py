@@ -39,11 +39,11 @@ class WantedKey:
     """A key moment of a request.
 
     Attributes:
-        asked: the key moment of the timeline.
+        requested: the key moment of the timeline.
         frame: fractional frame at the library's rate.
         choices: key moments of clips that may serve it; empty: locomotion is shown instead.
         used_instead: the labels used where the library lacks the requested ones, else None.
-        ball_height_known: whether the feed measured the ball's height then.
+        is_ball_height_known: whether the feed measured the ball's height then.
         rates: playback rates of its clip; none: `slots.KEY_PLAYBACK_RATES`.
     """
 
@@ -62,17 +62,17 @@ class Wanted:
     Attributes:
         plan: the plan, with the settings of the costs.
         track: the player at the library's rate.
-        asked: requested labels per frame, None where continuity alone counts.
+        requested_labels: requested labels per frame, None where continuity alone counts.
         gait: (T,) index into the library's gaits.
         timeline: the timeline, filled.
         keys: the key moments, in order of time.
         allowed: (C,) bool, clips to use.
         warnings: what the library lacks of the request.
         avoided: per frame the labels that must not be shown; empty where all may be shown throughout.
-        off_style: (N,) float32, cost per slot of library frames without the requested style, None where none is
+        style_cost: (N,) float32, cost per slot of library frames without the requested style, None where none is
             requested.
         weak_foot: side of the foot that key moments without a side avoid, or "".
-        taste: the player's preference for a lag, None for none.
+        lag_preference: the player's preference for a lag, None for none.
     """
 
     plan: Plan

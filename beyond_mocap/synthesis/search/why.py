@@ -37,8 +37,8 @@ class Other:
     Attributes:
         path: of the clip, below the library.
         mirrored: whether it is its mirror image.
-        more: what its best slot there would have cost more than the chosen one, in all; a negative one was cheaper
-            there, and more expensive later.
+        extra_cost: what its best slot there would have cost more than the chosen one, in all; a negative one was
+            cheaper there, and more expensive later.
     """
 
     path: str
@@ -57,10 +57,10 @@ class Reason:
         clip: index in the library.
         path: of the clip, below the library.
         mirrored: whether it is its mirror image.
-        shown: first and last frame in the clip's own rate.
+        clip_range: first and last frame in the clip's own rate.
         rate: playback rate.
         costs: term -> cost over the piece.
-        seam: term -> cost of the cut that begins it.
+        cut_costs: term -> cost of the cut that begins it.
         others: the nearest other clips for its first slot, the cheapest first.
     """
 
@@ -101,7 +101,7 @@ def reasons(library: Library, wanted: Wanted, edit: EditList, weights: Weights, 
 
     Args:
         library: the clips.
-        wanted: the request.
+        request: the request.
         edit: the edit list.
         weights: the search's.
         others: how many other clips are listed.
