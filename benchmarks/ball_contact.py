@@ -1,6 +1,4 @@
-"""Gap between the striking part and the ball, measured on the written poses: passing scenes, and takes with key moments
-at solved touches.
-"""
+"""Gap between striking part and ball on the written poses: passing scenes, and takes at solved touches."""
 
 from __future__ import annotations
 

@@ -47,9 +47,7 @@ def on_one_core() -> None:
 
 
 def blas_speed() -> str:
-    """Measure numpy's matrix products: official Blenders have no fast BLAS, and everything that multiplies is slower
-    there.
-    """
+    """Measure numpy's matrix products: official Blenders have no fast BLAS, so everything that multiplies is slower."""
     random = np.random.default_rng(0)
     a, b = (random.normal(size=(2000, 27)).astype(np.float32) for _ in range(2))
     took, _ = seconds(lambda: [a @ b.T for _ in range(10)])

@@ -179,9 +179,7 @@ def _fault_row(name: str, marker_set: str, share: float) -> str:
 
 
 def _mended(known: Planted, names: tuple[str, ...], apart: np.ndarray, kind: str) -> str:
-    """Format how many faults of a kind are fixed, `3 of 4`: 9 in 10 of its samples are then within 15 mm of the
-    truth.
-    """
+    """Format how many faults are fixed, `3 of 4`: 9 in 10 samples are then within 15 mm of the truth."""
     done = [fault for fault in known.faults if fault.kind == kind]
     right = 0
     for fault in done:

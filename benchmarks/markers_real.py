@@ -101,9 +101,7 @@ def planted_table() -> list[str]:
 
 
 def _ways(known: Planted):
-    """Generate the trial with all of the ball's marker, with it hidden for 40 ms to either side of release, and
-    without it.
-    """
+    """Generate the trial with all of the ball's marker, with it hidden 40 ms around release, and without it."""
     label = known.ball.asked.label
     index = known.trial.index(label)
     frames = np.abs(np.arange(len(known.trial)) / known.trial.fps - known.ball.asked.release) < 0.04

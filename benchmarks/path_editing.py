@@ -288,9 +288,7 @@ def timing() -> str:
 
 
 def cycled(kinds: Iterable[str] = tuple(CLIPS)) -> list[str]:
-    """Measure jerk at the transitions of recordings that are cycled along 25 m of the winding path, a line for each
-    kind.
-    """
+    """Measure jerk at the transitions of recordings cycled along 25 m of the winding path, a line per kind."""
     lines = ["Cycled on the winding path, jerk at transitions over the recording's own at that speed (95th "
              "percentile):", ""]
     for kind in kinds:

@@ -69,9 +69,7 @@ def report_of(library: Library, number: int) -> dict:
 
 
 def figures(reports: Mapping[int, Mapping]) -> list[str]:
-    """Build a row for each figure with a target: its value in every scenario, the recordings' own, and where it is
-    met.
-    """
+    """Build a row for each figure with a target: its value per scenario, the recordings' own, where it is met."""
     rows = {number: {row.name: row for row in judge_figures(report)} for number, report in reports.items()}
     lines = effort.format_head(["figure", "target", *(f"scenario {number}" for number in rows), "recordings", "met in"])
     for name in dict.fromkeys(row.name for of in rows.values() for row in of.values() if row.status):

@@ -157,9 +157,7 @@ def player_at(player: str, times: np.ndarray) -> np.ndarray:
 
 
 def _meetings(player: str) -> list[tuple[float, np.ndarray]]:
-    """List (s, (2,) m) where the player has to be at each touch: behind the ball as it leaves, under it for a
-    header.
-    """
+    """List (s, (2,) m) of the player at each touch: behind the ball as it leaves, under it for a header."""
     found = []
     for one in played():
         if one.touch.player == player:

@@ -58,9 +58,7 @@ def open_the_tab(bpy) -> None:
 
 
 def like_a_pitch(shading, overlay) -> None:
-    """Set colours, shadows and a sky in the solid view, which every computer draws quickly, with nothing before the
-    players.
-    """
+    """Set colours, shadows and a sky in the solid view, which every computer draws quickly."""
     shading.type, shading.light = "SOLID", "STUDIO"  # the light first: it decides which studio lights exist
     shading.color_type, shading.studio_light = "MATERIAL", "paint.sl"
     shading.show_shadows, shading.shadow_intensity, shading.show_object_outline = True, 0.4, False

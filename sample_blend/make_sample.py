@@ -255,9 +255,7 @@ def true_paths() -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
 
 
 def _rounded(rows, times: np.ndarray) -> np.ndarray:
-    """Build a path (N, 2) through waypoints, its corners in space and speed rounded by a Hann window of 1.2 s,
-    twice.
-    """
+    """Build a path (N, 2) through waypoints, rounded in space and speed by a Hann window of 1.2 s, twice."""
     table = np.array(rows, dtype=float)
     path = interpolate(times, table[:, 0], table[:, 1:3])
     for _ in range(2):
@@ -298,9 +296,7 @@ def _shot(ball: np.ndarray, times: np.ndarray) -> np.ndarray:
 
 
 def _dribbled(times: np.ndarray, path: np.ndarray, begin: float, end: float) -> np.ndarray:
-    """Compute the ball (N, 3) of a dribble: half a metre ahead at each touch (and at `begin` and `end`), further
-    between.
-    """
+    """Compute the ball (N, 3) of a dribble: half a metre ahead at each touch, further between."""
     velocity = np.gradient(path, times, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
     way = velocity / np.maximum(speed, 0.05)[:, None]

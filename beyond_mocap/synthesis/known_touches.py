@@ -230,9 +230,7 @@ def _touching(take: Take) -> list[KeyResult]:
 
 
 def _around(pair: tuple[int, int], others: list[tuple[int, int]], turns: list[float], fps: float) -> tuple[int, int]:
-    """Return the frames before and after a touch at which the ball changes its course anyway, without the touch
-    itself.
-    """
+    """Return the frames before and after a touch at which the ball changes its course for other reasons."""
     low = [*(p[1] for p in others if p[1] <= pair[0]), *(int(np.floor(turn)) for turn in turns if turn < pair[0] - 1.5)]
     high = [*(p[0] for p in others if p[0] >= pair[1]), *(int(np.ceil(turn)) for turn in turns if turn > pair[1] + 1.5)]
     return max(low, default=pair[0] - int(fps)), min(high, default=pair[1] + int(fps))

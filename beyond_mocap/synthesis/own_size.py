@@ -21,9 +21,7 @@ _EVEN = 1e-9  # m, rounding in the height of a ball on the ground
 
 
 def taken_in_library_size(take: Take, size: float) -> Take:
-    """Convert a take of `to_player_size` back to the library's size, without its pins and with the ball as it was
-    met.
-    """
+    """Convert a take back to the library's size, without its pins and with the ball as it was met."""
     motion, contacts = take.unpinned or (take.motion, take.contacts)
     ball = take.met_ball or take.ball
     take = replace(

@@ -1,6 +1,4 @@
-"""Pins as a table `time_s,part,x_m,y_m,z_m,hold_s`, one line for each place where a hand, a foot or the gaze has to
-be.
-"""
+"""Pins as a table `time_s,part,x_m,y_m,z_m,hold_s`: one line per place of a hand, a foot or the gaze."""
 
 from __future__ import annotations
 

@@ -360,9 +360,7 @@ class _Update:
         return BallPath(self.track.times, self.ball, self.track.ball_measured)
 
     def _keys_as_before(self) -> tuple[KeyResult, ...]:
-        """Return the results; for a key moment whose frame was not affected the old one, with the key moment as
-        requested now.
-        """
+        """Return the results; where a key moment's frame was not affected, the old one for the new request."""
         out, left = [], list(self.before.keys)
         for key in self.keys:
             near = int(np.clip(round(key.frame), 0, len(self.anew) - 1))

@@ -100,8 +100,8 @@ def synthesize(
         progress: called as progress(fraction, text).
         cancelled: returns whether to stop.
         hurry: returns whether to finish early: method "path" then keeps what it has found, searches the rest
-            quickly, and the take's warnings say from which second on; before anything is found, and by the other methods, this
-            cancels.
+            quickly, and the take's warnings say from which second on; before anything is found, and by the other
+            methods, this cancels.
         used: source frames that another solution avoids where it can (method "path"; the others differ by their seed).
         narrow: whether method "path" searches quickly from the start.
     Raises:
@@ -244,9 +244,7 @@ def with_pins(take: Take, recordings: Library) -> Take:
 
 
 def look_of(library: Library) -> np.ndarray:
-    """Estimate the direction (3,) in which heads look, in their own frame, as the mean over the library's
-    locomotion; cached.
-    """
+    """Estimate the direction (3,) in which heads look, in their own frame, over the library's locomotion; cached."""
     if library not in _looks:
         frames = library.frames
         gaits = [i for i, word in enumerate(frames.vocabulary) if word in LOCOMOTION_WORDS]

@@ -1,6 +1,4 @@
-"""The result of a synthesis: the motion on the pitch, the source of each of its frames, the ball, and the filled
-timeline.
-"""
+"""The result of a synthesis: motion, source of every frame, ball, filled timeline and what was reported."""
 
 from __future__ import annotations
 

@@ -325,9 +325,7 @@ def joints_down(skeleton: Skeleton, high: int, low: int) -> list[int]:
 
 
 def _limb_world(body: Body, rotations: np.ndarray, chain: tuple[int, int, int]) -> dict[int, np.ndarray]:
-    """Compute the world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in
-    `body`.
-    """
+    """Compute world rotations (W, 4) of a limb's joints for other local ones; above the limb all is as in `body`."""
     world, above = {}, body.world[:, body.skeleton.parents[chain[0]]]
     for joint in joints_down(body.skeleton, chain[0], chain[2]):
         above = world[joint] = quaternion.multiply(above, rotations[:, joint])

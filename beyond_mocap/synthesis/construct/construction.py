@@ -125,9 +125,7 @@ class Construction:
         return replace(planted, root=root, rotations=struck.rotations), ball
 
     def _solve_heading(self) -> np.ndarray:
-        """Solve the heading (T,) rad: given values, the compromise of track and source elsewhere, turned to the ball
-        at touches.
-        """
+        """Solve the heading (T,) rad from given values, track and source, turned to the ball at touches."""
         given = self.heading if self.old is None else self.old.heading_of(self.smooth.pose)
         heading = solve_heading(self.track, self.smooth, given)
         if self.old is not None:

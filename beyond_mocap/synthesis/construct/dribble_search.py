@@ -468,9 +468,7 @@ class Search:
         return np.where((sources == _START)[:, None], 0.0, costs)
 
     def _pushing(self, nodes: np.ndarray) -> np.ndarray:
-        """Compute the speed (S,) m/s at which feet push the ball when it leaves: the foot's own, or the ball's over
-        the push.
-        """
+        """Compute the speed (S,) m/s at which feet push the ball away: the foot's, or the ball's over the push."""
         speed = np.sum(self.velocity[nodes] * self.normal[nodes], axis=-1)
         begun = self.pushed[nodes]
         frames = np.maximum(self.frame[nodes] - self.frame[begun], 1)

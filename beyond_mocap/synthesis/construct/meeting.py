@@ -1,6 +1,4 @@
-"""Geometry of ball contact: where the ball may be within its noise, how far the body is from it, the ball's
-trajectory.
-"""
+"""Geometry of ball contact: where the ball may be within its noise, how far the body is from it, its trajectory."""
 
 from __future__ import annotations
 
@@ -290,7 +288,5 @@ def eased(rising: np.ndarray, falling: np.ndarray) -> np.ndarray:
 
 
 def eased_around(frames: np.ndarray, low: float, first: float, last: float, high: float) -> np.ndarray:
-    """Ease 0 .. 1 .. 0: 1 in frames first .. last, 0 up to `low` and from `high` on; twice continuously
-    differentiable.
-    """
+    """Ease 0 .. 1 .. 0, twice differentiable: 1 in frames first .. last, 0 up to `low` and from `high` on."""
     return eased((frames - low) / max(first - low, 1e-9), (high - frames) / max(high - last, 1e-9))

@@ -226,9 +226,7 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> f
 
 
 def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
-    """Compute the smallest part of the angle `apart` that brings a part (2,) within _REACHED of its goal (2,), or
-    all of it.
-    """
+    """Compute the smallest part of `apart` that brings a part (2,) within _REACH of its goal (2,), or all of it."""
     p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
     # law of cosines: the angle at which part and goal are _REACHED apart
     free = np.arccos(np.clip((p * p + g * g - _REACHED**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))

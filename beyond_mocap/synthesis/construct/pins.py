@@ -227,9 +227,7 @@ class _Work:
         self.contacts[way, int(side)] &= np.linalg.norm(new[:, joint] - old[:, joint], axis=1) < _NEAR
 
     def miss(self, pin, start: float) -> float:
-        """Measure the largest miss while a pin holds; infinite for a pin outside the motion or a part that the body
-        lacks.
-        """
+        """Measure the largest miss while a pin holds; infinite for a pin outside the motion or a missing part."""
         stays = target([pin], start, self.before.fps, len(self.root)).stays
         chain = _chains(self.body).get(pin.part, (self.body.head_or_neck,))
         if not stays or None in chain:
@@ -364,9 +362,7 @@ class _Part:
         return float(sum(np.linalg.norm(self.skeleton.offsets[joint]) for joint in bones))
 
     def _lack(self, joint: int, goal: np.ndarray, reach) -> tuple[np.ndarray, np.ndarray]:
-        """Compute how far (W,) m `joint` is too far from the goal, with a soft onset, and the direction (W, 3) to
-        the goal.
-        """
+        """Compute how far (W,) m `joint` is too far from the goal, softly, and the direction (W, 3) to it."""
         away = goal - self.places[:, joint]
         distance = np.maximum(np.linalg.norm(away, axis=1), 1e-9)
         return _SOFT_LACK * np.logaddexp(0.0, (distance - reach) / _SOFT_LACK), away / distance[:, None]
@@ -423,9 +419,7 @@ class _Part:
             self._turn(head, smoothstep((found.share - 0.7) / 0.3)[:, None] * turn)
 
     def _gaze_turn(self, head: int, found: Target, look: np.ndarray) -> np.ndarray:
-        """Compute rotation vectors (W, 3), world, from where the head looks to the place, within the range of a
-        neck.
-        """
+        """Compute world rotation vectors (W, 3) from where the head looks to the place, within a neck's range."""
         sight = quaternion.rotate(self.world[:, head], np.broadcast_to(look, (len(self.root), 3)))
         away = found.place - self.places[:, head]
         facing = heading_from_positions(self.skeleton, self.places)

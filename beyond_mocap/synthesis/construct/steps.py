@@ -363,9 +363,7 @@ class _Plan:
         return float(((there[at] - here[at]) * np.conj(here[after] + there[after] - here[before] - there[before])).real)
 
     def _next(self, side: int, now: int) -> tuple[int, int] | None:
-        """Choose the frames in which the foot's next dragged stance is broken and in which it is in contact again,
-        or None.
-        """
+        """Choose the frames in which the foot's next dragged stance is broken and regained; None if there are none."""
         if not self.left[side]:
             return None
         first, end = self.left[side][0]

@@ -288,9 +288,7 @@ def _other_leg(body: Body, foot: Surface, at: int) -> list[tuple]:
 
 
 def _together(body: Body, hands: Sequence[Surface], at: int, words: frozenset[str]) -> bool:
-    """Return whether all labelled hands reach for the ball: in a dive only to catch it, and where they are close
-    together.
-    """
+    """Return whether all labelled hands reach for the ball: in a dive only to catch it, and if close together."""
     middles = [np.mean(body.line(hand, at), axis=0) for hand in hands]
     near = np.linalg.norm(middles[0] - middles[-1]) < _HANDS_APART
     return not met_within(words) or bool(near and by_both_hands(words))
@@ -368,8 +366,8 @@ def _flat(v: np.ndarray) -> np.ndarray:
 def _reached(scene: _Scene, body: Body) -> tuple[Body, float]:
     """Bring the parts of a body to the ball, within their reach; also return how far they were moved, m.
 
-    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a spine
-    moves on an arc.
+    Requested shifts and what the body can do are solved alternately, since a nearly straight limb yields softly and a
+    spine moves on an arc.
     """
     own = scene.lines(body, scene.moment.frame)
     if np.linalg.norm(scene.ball_and_needs(own, scene.moment.frame)[1]) < _CLOSE:

@@ -218,9 +218,7 @@ def _out_of_reach(played: Played, keys: list[Moment]) -> TimedLine | None:
 
 
 def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> TimedLine | None:
-    """Build the line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None where there are
-    none.
-    """
+    """Build the line "what: 4.2 s by 0.13 m, ..." for (second, by how much) of key moments; None without any."""
     listed = ", ".join(f"{told_time(time)} s by {form.format(value)}" for time, value in found)
     return TimedLine(f"{what}: {listed}", *((time, time) for time, _ in found)) if found else None
 

@@ -61,9 +61,7 @@ def moments(played: Played, keys: tuple[KeyMoment, ...], stride: np.ndarray, lib
 
 
 def with_made(library: Library | None, played: Played) -> Library | None:
-    """Return the library whose gaits and key moments were played: with its synthetic clips where one of them is
-    shown.
-    """
+    """Return the library that was played: with its synthetic clips where one of them is shown."""
     if library is None or not any(path.startswith(MADE_FOLDER) for path in played.clips):
         return library
     return library.extended
@@ -95,9 +93,7 @@ def _frame_at(played: Played, frame: float) -> int:
 
 
 def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, library: Library | None):
-    """Find the library's key that the run plays: one with the requested labels if any, then the nearest to what
-    `frame` shows.
-    """
+    """Find the library key that the run plays: with the requested labels if any, then nearest to `frame`."""
     if library is None or played.clip[run[0]] < 0:
         return None
     path, side = played.clips[played.clip[run[0]]], bool(played.mirrored[run[0]])
@@ -108,9 +104,7 @@ def _key_in_run(played: Played, run: np.ndarray, frame: int, key: KeyMoment, lib
 
 
 def _instead(key: KeyMoment, words, result) -> tuple[str, ...] | None:
-    """Return the labels used instead of the requested ones: what a take says of it, else those played where they
-    lack some.
-    """
+    """Return the labels used instead of the requested ones, by the take or by what is played there."""
     if result is not None and result.used_instead is not None:
         return tuple(result.used_instead)
     return None if set(key.words) <= set(words) else tuple(sorted(words))

@@ -1,6 +1,4 @@
-"""Measures of movement: how well a body follows its track, its sway, surge and speeds, how hard its transitions are,
-and
-what its feet do: skate on contacts, slide per stance, GMD's skating ratio, the ground.
+"""Measures of movement: following the track, sway, surge, speeds, hardness of transitions, and the feet.
 
 Pelvis (T, 2) and track (T, 2) are in metres on the pitch, one row per output frame. The *root* of
 `../shared/metrics.md` is the pelvis seen through a 1.5 s window, which removes the sway that a body must keep; the

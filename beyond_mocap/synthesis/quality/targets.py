@@ -1,6 +1,4 @@
-"""Targets of the report's figures (`../shared/metrics.md`, last column): a fixed limit, or what the recordings
-reach.
-"""
+"""Targets of the report's figures (`../shared/metrics.md`, last column): fixed limits, or the recordings' own."""
 
 from __future__ import annotations
 

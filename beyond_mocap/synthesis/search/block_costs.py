@@ -1,6 +1,4 @@
-"""Costs of blocks: labels other than requested (Faustino 2024, §3.2.2, eq. 18), and distance of poses (§3.2.1, eq.
-16, 17).
-"""
+"""Costs of blocks: other labels (Faustino 2024, §3.2.2, eq. 18), and distance of poses (§3.2.1, eq. 16, 17)."""
 
 from __future__ import annotations
 

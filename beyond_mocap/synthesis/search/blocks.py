@@ -214,9 +214,7 @@ class BlockSearch:
         return [self._members(clusters, usable, label) for label in choice]
 
     def _cluster_costs(self, clusters, usable: np.ndarray, slot: int) -> np.ndarray:
-        """Compute alpha times D of each cluster, the mean over its blocks (eq. 19); a key moment forbids clusters
-        without it.
-        """
+        """Compute alpha D of each cluster, a mean over its blocks (eq. 19); a key moment forbids others."""
         count = len(clusters.medoid)
         cost = self.annotation.of_blocks(clusters.start, self.asked_words(slot, clusters.length))
         blocks, which = self._key_blocks(slot, clusters.length)
@@ -240,9 +238,7 @@ class BlockSearch:
         return Candidates(self.frames.clip[start], start)
 
     def _anything(self) -> Candidates:
-        """Build candidates for a library whose clips are all shorter than the longest block: the start of every
-        usable clip.
-        """
+        """Build candidates where all clips are shorter than the longest block: the start of every usable one."""
         clip = np.flatnonzero(self.wanted.allowed)
         return Candidates(clip, self.frames.first[clip])
 
@@ -303,9 +299,7 @@ class BlockSearch:
         return weak_foot_cost(self.wanted.keys[number].asked.words, (key,), self.wanted.weak_foot)
 
     def _shows_avoided(self, start: np.ndarray, slot: int, length: int) -> np.ndarray:
-        """Return (M,) bool: whether a block that starts at frame `start` (M,) and fills a slot shows an avoided
-        label.
-        """
+        """Return (M,) bool: whether blocks from frames `start` (M,) on show a label that the slot avoids."""
         avoid = self.wanted.avoided_in(slot * length, (slot + 1) * length)
         if not avoid:
             return np.zeros(len(start), bool)

@@ -1,6 +1,4 @@
-"""Edit list: which clip frame each output frame shows. Every search returns one, and it is all that a take has to
-store.
-"""
+"""Edit list: which clip frame each output frame shows. Every search returns one; a take stores nothing else of it."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Candidates that a library has for the path search, whatever is requested: computed once and cached with the
-library.
-"""
+"""Candidates of the path search that depend only on the library: computed once and cached with it."""
 
 from __future__ import annotations
 

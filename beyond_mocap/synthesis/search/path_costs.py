@@ -195,9 +195,7 @@ class PathCosts:
         return np.clip(np.round(frame).astype(int), 0, len(self.frames) - 1)
 
     def asked(self, first: int, end: int) -> tuple[float, float]:
-        """Return the mean speed, m/s, and change of direction, rad, that the track has from frame first to end;
-        cached.
-        """
+        """Return the track's mean speed, m/s, and change of direction, rad, from frame first to end; cached."""
         if (first, end) not in self._asked:
             track = self.wanted.track
             last = min(end, len(track.times) - 1)
@@ -366,9 +364,7 @@ class PathCosts:
         yield "cut", entered
 
     def left_and_entered(self, ends: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,), whatever the
-        other is.
-        """
+        """Compute the cost (B,) of leaving library frames ends (B,), and (K,) of cutting to start (K,)."""
         left = self.weights.wild * self.offer.wild_before[ends]
         entered = self.weights.switch + self.weights.wild * self.offer.wild_after[start]
         return left.astype(np.float32), entered.astype(np.float32)

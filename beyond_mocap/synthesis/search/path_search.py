@@ -202,9 +202,7 @@ class PathSearch:
                                  piece=to.piece, recent=recent))
 
     def _arriving(self) -> tuple[States, int]:
-        """Build the one state from which a stretch starts: the frame before, with what was shown up to there; and
-        its length.
-        """
+        """Build the state from which a stretch starts, the frame before it; and that state's length, 1."""
         first, edit = self.between.first, self.between.edit
         at = np.array([first - 1])
         shown = edit.frame[np.maximum(first - SLOT * np.arange(MEMORY_SLOTS, 0, -1), 0)]
@@ -247,9 +245,7 @@ class PathSearch:
                                  recent=np.roll(before.recent[back], -1, axis=1)))
 
     def _kept(self, states: States) -> States:
-        """Keep the cheapest free states and the cheapest bound ones, as many of each as the beam keeps, and update
-        their memory.
-        """
+        """Keep the cheapest free and the cheapest bound states, a beam of each, and update their memory."""
         order = np.argsort(states.cost, kind="stable")
         free = states.piece[order] < 0
         kept = states.only(np.concatenate([order[free][: self.width.beam], order[~free][: self.width.beam]]))
@@ -293,9 +289,7 @@ class PathSearch:
         yield clip, start, rate, cost, np.full(len(soon), -1)
 
     def _as_before(self, low: int, high: int):
-        """Build the candidate of what the edit list shows in a slot, so that the search may return to it; none if it
-        is cut there.
-        """
+        """Build the candidate of what the edit list shows in a slot, none if it is cut there."""
         edit = self.between.edit
         at = np.array([] if np.any((edit.seams > low) & (edit.seams < high)) else [low], int)
         start, rate = edit.frame[at], _steps(edit, at)
@@ -341,9 +335,7 @@ class PathSearch:
         return clip, start, rate, cost, bound, before.piece[bound]
 
     def _continued(self, slot: int, before: States, ends: np.ndarray, free: np.ndarray):
-        """Continue without a cut, at each playback rate; a slot a little longer than SLOT must still end inside the
-        clip.
-        """
+        """Continue without a cut, at each playback rate, where the slot still ends inside the clip."""
         back = np.repeat(free, len(RATES))
         number = np.tile(np.arange(len(RATES)), len(free))
         clip, start, rate = before.clip[back], ends[back], RATES[number]

@@ -179,9 +179,7 @@ def used_in(library: Library, edit, first: int, end: int) -> tuple[Used, ...]:
 
 
 def price(library: Library, used: tuple[Used, ...]) -> np.ndarray:
-    """Compute the extra cost (N,) float32 per slot of every library frame; clips that the library lacks are left
-    out.
-    """
+    """Compute the extra cost (N,) float32 per slot of every library frame; unknown clips are left out."""
     cost = np.zeros(len(library.frames), np.float32)
     frames, around = library.frames, AROUND * library.fps
     place = {(clip.path, clip.mirrored): number for number, clip in enumerate(library.clips)}

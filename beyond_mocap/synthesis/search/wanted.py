@@ -1,6 +1,4 @@
-"""The request in frames of the library's rate: what is requested of every frame, and which clips can serve each key
-moment.
-"""
+"""The request at the library's rate: what every frame has to show, and which clips can serve each key moment."""
 
 from __future__ import annotations
 

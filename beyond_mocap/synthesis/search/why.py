@@ -248,7 +248,7 @@ def _entry(search: PathSearch, way: _Way, slot: int) -> dict[str, float]:
 
 
 def _state_before(search: PathSearch, way: _Way, slot: int) -> tuple[States, np.ndarray]:
-    """Build the state of the slot before with no cost so far, and the library frame (1,) at which it ends."""
+    """Build the state of the slot before, with no cost so far, and the library frame (1,) at its end."""
     starts = way.start[max(slot - MEMORY_SLOTS, 0) : slot]
     recent = np.full(MEMORY_SLOTS, -1)
     recent[MEMORY_SLOTS - len(starts) :] = search.offer.bucket[search.costs.inside(starts)]
