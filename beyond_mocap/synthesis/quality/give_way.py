@@ -156,8 +156,8 @@ def _too_fast(played: Played, track: Track | None, library: Library | None) -> T
     most = speed.max(where=fast, initial=0.0)
     return _line(
         played.times, fast,
-        f"strides are stretched: the track reaches {most:.1f} m/s, the library only {library.fastest:.1f} m/s x "
-        f"{REACH[1]:g}",
+        f"the track reaches {most:.1f} m/s, faster than the library's {library.fastest:.1f} m/s x {REACH[1]:g}: "
+        "strides are stretched",
     )  # fmt: skip
 
 

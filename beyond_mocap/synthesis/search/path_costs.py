@@ -111,8 +111,8 @@ class Weights:
         facing: per radian between the body and where it should face.
         words: for lacking all requested labels.
         unasked: for frames of an action that is not requested, or that carry no label.
-        made: for a synthetic clip; it is used only where recordings miss the speed by more.
-        made_key: the same at key moments, where a recording is worth more.
+        synthetic: for a synthetic clip; it is used only where recordings miss the speed by more.
+        synthetic_key: the same at key moments, where a recording is worth more.
         rate: per unit of time warp.
         stretch: per unit of time warp beyond 0.85 to 1.15.
         switch: for any cut.

@@ -216,7 +216,7 @@ class PathSearch:
 
         Args:
             states: of the last slot.
-            shown: frames of the last slot.
+            frames_shown: frames of the last slot.
         """
         edit, at = self.between.edit, np.array([self.between.end])
         goal = Offered(edit.clip[at], edit.frame[at], _steps(edit, at), np.zeros(1), np.array([-1]))
@@ -229,7 +229,7 @@ class PathSearch:
         Args:
             slot: its number.
             before: the states of the slot before.
-            shown: frames of the slot before.
+            frames_shown: frames of the slot before.
         """
         ends = before.start + before.rate * shown
         # a state inside a piece that has not ended can only continue it; piece -1 reads the appended 0 and is masked

@@ -123,7 +123,7 @@ def asked_anew(library: Library, edit: EditList, after: Wanted, first: int, end:
 
 
 def stretches(touched: np.ndarray, gap: int) -> list[Stretch]:
-    """List (first, end) of the runs in which `touched` (T,) is true, merged where less than `gap` frames apart."""
+    """List (first, end) of the runs in which `affected` (T,) is true, merged where less than `gap` frames apart."""
     return joined(runs(touched), gap)
 
 

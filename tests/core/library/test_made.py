@@ -142,7 +142,7 @@ def test_a_ball_taken_on_the_run_is_made_and_no_foot_slides(with_a_receive, spee
     (key,) = take.keys
     assert key.clip.startswith(MADE_FOLDER + TAKEN) == is_made and key.used_instead is None
     assert key.frame == pytest.approx(3.0 * take.motion.fps, abs=0.51)
-    assert any("a ball taken on the run" in line for line in take.warnings) == is_made
+    assert any("synthetic reception on the run" in line for line in take.warnings) == is_made
     body, places = identify(take.motion.skeleton), forward_kinematics(take.motion)[0]
     toes = places[:, [body.left.toe, body.right.toe]]
     assert stance_travel(toes, stances(take.contacts)).max(initial=0.0) < 0.15
