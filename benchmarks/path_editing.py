@@ -133,7 +133,7 @@ class Row:
         clip: the recording.
         path: name of the path.
         values: figures by dotted name.
-        ms: of `ride`.
+        ms: of `edit_path`.
     """
 
     kind: str
@@ -149,7 +149,7 @@ def rides(kinds: Iterable[str] = tuple(CLIPS), paths: Iterable[str] = tuple(ALL)
     Args:
         kinds: keys of CLIPS.
         paths: keys of ALL.
-        settings: of `RideSettings`.
+        settings: of `PathEditSettings`.
     """
     chosen, rows = RideSettings(**settings), []
     for kind in kinds:
@@ -269,7 +269,7 @@ def kept(rows: list[Row]) -> str:
 
 
 def timing() -> str:
-    """Measure ms of `prepare` and `ride` for 600 frames at 60 per second, the best of seven."""
+    """Measure ms of `prepare_source` and `edit_path` for 600 frames at 60 per second, the best of seven."""
     motion = recording("lafan1", "walk1_subject1_walk2_filtered")
     motion = resample(motion, 60.0).frames(0, BUDGET_FRAMES)
     settings, path = RideSettings(), through(winding(), "winding")

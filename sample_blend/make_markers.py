@@ -4,7 +4,7 @@
 
 `static.trc` is a performer who stands still, `throw.c3d` the same performer throwing a ball with one marker at 28 m/s,
 `walk.trc` another performer walking, without a static trial, with gaps, a swap and an unlabeled stretch. What is
-reconstructed from them can be compared with the ground truth (`beyond_mocap.synthetic.ground_truth.planted_markers`).
+reconstructed from them can be compared with the ground truth (`beyond_mocap.synthetic.ground_truth.synthetic_markers`).
 The same code gives the same bytes. Needs the core and the C3D package.
 """
 

@@ -93,7 +93,7 @@ def course_of(solved: SolvedBall, player: str, plan: Plan) -> SolvedCourse:
 
 
 def _far(times: np.ndarray, seen: np.ndarray) -> np.ndarray:
-    """Return (M,) bool: times more than _UNSEEN seconds from the nearest of the times `seen` (K,)."""
+    """Return (M,) bool: times more than _MAX_SAMPLE_GAP seconds from the nearest of the times `seen` (K,)."""
     if len(seen) < 2:
         return np.ones(len(times), bool)
     after = np.clip(np.searchsorted(seen, times), 1, len(seen) - 1)
@@ -115,7 +115,7 @@ def _moved(timeline: Timeline, touches: tuple[Touched, ...]) -> Timeline:
     """Move key moments to the touches that fit them best, each touch for one, in the order of both.
 
     Key moments and touches are aligned like two lines of text (edit distance): a key moment without a touch costs
-    FURTHEST, one with a touch the seconds between them and what of the touch does not fit its labels.
+    MAX_TOUCH_OFFSET, one with a touch the seconds between them and what of the touch does not fit its labels.
     """
     keys = [replace(key, solved=None) for key in timeline.keys]
     mine = [touch for touch in touches if touch.mine is not False]

@@ -124,7 +124,7 @@ class Plan:
     fields all the same.
 
     Attributes:
-        track: the player's samples, cleaned (`motion.track.clean`), with the ball where the feed has it.
+        track: the player's samples, cleaned (`motion.track.clean_track`), with the ball where the feed has it.
         timeline: the requested annotations (`annotation.read_timeline`), not yet filled.
         library: folder of the library.
         pins: where hands, feet and gaze have to be, in order of time.
@@ -137,8 +137,9 @@ class Plan:
         InputError: for a number outside the limits of its setting, and for two pins of one part at one time.
     Source: Faustino 2024: catch_up §3.3.2, alpha eq. 13 (for "path" `synthesis.search.path_costs`), delta §3.2.4, omega
         and gaits §3.1.1, seam_window eq. 25 (twice its s; "path" blends over half of it). Others: made in
-        `library.synthetic_clips`, track_window in `motion.track.smoothed`, solve_touches in `resolved_touches`, lag in
-        `match.crowd.variety.lags`; the root error is always measured with a root_window of 1.5.
+        `library.synthetic_clips`, track_window in `motion.track.smooth_positions`, solve_touches in
+        `resolved_touches`, lag in `match.crowd.variety.choose_lags`; the root error is always measured with a
+        root_window of 1.5.
     """
 
     track: Track

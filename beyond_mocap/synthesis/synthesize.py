@@ -140,7 +140,7 @@ def constructed(library: Library, plan: ResolvedPlan, edit: EditList, progress: 
     reports them. The same arguments and numpy give the same bits.
 
     Args:
-        library: the clips, with synthetic ones (`Library.extended`) where the edit list shows them.
+        library: the clips, with synthetic ones (`Library.with_synthetic_clips`) where the edit list shows them.
         plan: the resolved plan.
         edit: at the library's rate, from the track's first time on.
         progress: called as progress(fraction, text).

@@ -103,8 +103,8 @@ class Resting:
     A nearly straight limb misses its own place a little, because it extends softly; the difference cancels out.
 
     Attributes:
-        chain: upper, middle and end joint, as for `limb.two_bone`.
-        soft: m of soft extension, as for `limb.two_bone`.
+        chain: upper, middle and end joint, as for `limb.solve_two_bone`.
+        soft: m of soft extension, as for `limb.solve_two_bone`.
         world: joint -> (W, 4) world rotation.
     """
 

@@ -90,7 +90,7 @@ def _held(places: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _eased_in(known: np.ndarray, fps: float) -> np.ndarray:
-    """Compute the weight (T,) of the gaze: 1 where a place is known, fading within SECONDS beside gaps."""
+    """Compute the weight (T,) of the gaze: 1 where a place is known, fading within SMOOTHING_SECONDS beside gaps."""
     if known.all():
         return np.ones(len(known))
     frames, without = np.arange(len(known)), np.flatnonzero(~known)

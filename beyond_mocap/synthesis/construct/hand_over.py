@@ -3,8 +3,8 @@
 Around the stretch both motions show the same source frames, but what was solved over all frames (how far a foot is
 shifted, how low the pelvis is) may differ there by some centimetres. Root and joints are blended within the hand-over;
 feet change over at once where they are in the air. A foot in contact at the border stays where the old motion has it
-until it lifts: its shift is `foot_plant.shift` of a foot that does not move at all. Where both motions stay in place at
-different places, the feet step over (`step_over`).
+until it lifts: its shift is `foot_plant.solve_shift` of a foot that does not move at all. Where both motions
+stay in place at different places, the feet step over (`step_over`).
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def meetings(
     raised = tuple((end + lift)[:, None] for end in line)
     start[:, 2] = height
     touching = touching_places(raised, radius, start, np.array([aim.direction for aim in aims]))
-    # the part of `room.whole` that is left for level moves
+    # the part of `ball_range.total` that is left for level moves
     level = np.sqrt(np.maximum(room.whole**2 - (height - ball[2]) ** 2, 0.0))
     away = touching[:, :2] - ball[:2]
     places = np.concatenate([ball[:2] + _within(away, level), height[:, None]], axis=1)

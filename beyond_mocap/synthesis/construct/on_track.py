@@ -74,7 +74,7 @@ def facing(
         velocity: (T, 2) m/s of the recording in its facing frame.
         turn: (T,) rad that the recording turned since the frame before.
         given: (T,) rad that the heading has to be, NaN where it is free.
-        firm: (T,) how many times firmer than usual the recording's turning is followed (`turning_firmness`).
+        firm: (T,) how many times firmer than usual the recording's turning is followed (`compute_turning_firmness`).
         aim: (T,) rad that a body in place turns to slowly.
     Returns:
         (T,) rad, unwrapped.
@@ -110,8 +110,7 @@ def follow_turning(
 
 
 def turning_firmness(standing: np.ndarray, height: np.ndarray, fps: float) -> np.ndarray:
-    """Compute how firmly the recording's turning is followed: OFF_THE_FEET in flight and where the hips are low, else
-    1.
+    """Compute how firmly the recording's turning is followed: AIRBORNE_FIRMNESS in flight or with low hips, else 1.
 
     Args:
         heel_toe_contacts: (T, 2, 2) bool, heel and toe contacts.
@@ -228,7 +227,7 @@ def _turn_at_touch(skeleton: Skeleton, root, rotations, ball, touch: Touch) -> f
 def _least_turn(part: np.ndarray, goal: np.ndarray, apart: float) -> float:
     """Compute the smallest part of `apart` that brings a part (2,) within _REACH of its goal (2,), or all of it."""
     p, g = float(np.linalg.norm(part)), float(np.linalg.norm(goal))
-    # law of cosines: the angle at which part and goal are _REACHED apart
+    # law of cosines: the angle at which part and goal are _REACH apart
     free = np.arccos(np.clip((p * p + g * g - _REACHED**2) / max(2.0 * p * g, 1e-9), 0.0, 1.0))
     return float(np.sign(apart) * max(0.0, abs(apart) - free))
 

@@ -102,7 +102,7 @@ def pinned(motion: Motion, contacts: np.ndarray, pins: Sequence, start: float, l
         contacts: (T, 2) bool, left and right foot in contact.
         pins: objects with `time` and `hold` s, `part` and `position` m (`plan.Pin`), no two of one part at one time.
         start: s, time of frame 0 on the pins' clock.
-        look: (3,) unit, direction in which the head joint looks, in its own frame (`look_axis`).
+        look: (3,) unit, direction in which the head joint looks, in its own frame (`estimate_look_axis`).
     """
     out, targets = _Work(motion, np.array(contacts), look), {}
     for part in dict.fromkeys(pin.part for pin in pins):

@@ -253,7 +253,7 @@ class _Plan:
         self.left = [self._dragged(side, 0) for side in (_LEFT, _RIGHT)]
 
     def _room(self) -> np.ndarray:
-        """Compute how long (T,) m a stride may be without the feet coming closer than APART.
+        """Compute how long (T,) m a stride may be without the feet coming closer than FOOT_SEPARATION.
 
         As the body drifts, the foot moves from half a stride ahead of the other one to half a stride behind it.
         """
@@ -372,7 +372,7 @@ class _Plan:
         if not len(places):
             return None
         lag = self.lag[first:end, side]
-        # break a stance of lag n into equal parts, each with at most SPARED
+        # break a stance of lag n into equal parts, each with at most DRAG_TOLERANCE
         share = lag.max() / np.ceil(lag.max() / SPARED)
         due = np.full(len(lag), share)
         if any(a < end and first < b for a, b in self.left[1 - side][:1]):
@@ -414,7 +414,7 @@ def _apart(plan: _Plan, stepped: np.ndarray, left: np.ndarray) -> np.ndarray:
     """Compute how far stepping feet are set down further apart, so that the left one stays to the left of the right
     one.
 
-    The foot of a stance lies at the mean of where the body takes it (`foot_plant.shift`).
+    The foot of a stance lies at the mean of where the body takes it (`foot_plant.solve_shift`).
 
     Args:
         plan: the steps.

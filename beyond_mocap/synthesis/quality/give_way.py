@@ -226,7 +226,7 @@ def _at_moments(what: str, found: list[tuple[float, float]], form: str) -> Timed
 def _other_words(
     played: Played, asked: Timeline | None, keys: list[Moment], library: Library | None
 ) -> TimedLine | None:
-    """Report labels of the user's spans that clips carry, but that are not shown for WORD_SECONDS or more.
+    """Report labels of the user's spans that clips carry, but that are not shown for LABEL_SECONDS or more.
 
     Entry and exit of key moments do not count.
     """

@@ -136,8 +136,8 @@ def crossing(clip_frames: np.ndarray, times: np.ndarray, key_frame: float) -> fl
 def ball_gap(played: Played, moment: Moment) -> float:
     """Measure the distance between the striking surface and the surface of the written ball at a key moment.
 
-    Measured at the output frame nearest to the requested time (`ball_contact.contact_gap`, overlap counts as distance
-    too). The part is that of the labels that are played there; of the requested ones where those touch no ball.
+    Measured at the output frame nearest to the requested time (`ball_contact.measure_contact_gap`, overlap counts as
+    distance too). The part is that of the labels that are played there; of the requested ones where those touch no ball.
 
     Returns:
         m, NaN without ball or part.
@@ -153,7 +153,7 @@ def met(played: Played, moment: Moment) -> tuple[float, float]:
     """Measure when the ball is met, and the gap there.
 
     Both are at the key moment, except for dives, in which a hand meets the ball at its nearest on the flight
-    (`ball_contact.met_within`).
+    (`ball_contact.find_contact_window`).
 
     Returns:
         Seconds on the track's clock and m, as in `measure_ball_gap`; NaN without ball or part.

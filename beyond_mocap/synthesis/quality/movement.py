@@ -26,7 +26,7 @@ from ...motion.track import Track, zero_phase_hann
 ROOT_WINDOW = 1.5  # s, of the root error
 TRAVEL_WINDOW = 1.0  # s, of the travel speed
 STANDING = 0.5  # m/s below which a body counts as standing
-SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `speed_class`
+SPEED_EDGES = (1.0, 2.0, 3.0, 4.5)  # m/s between the classes of `classify_speed`
 JERK_REACH, SEAM_TO_JERK = 8, 2  # jerk indices to either side of a transition, and from its middle index to its frame
 _WIDTH = 2 * JERK_REACH + 1
 NOTICED_SLIDE = 0.021  # m of foot slide from which on people notice it

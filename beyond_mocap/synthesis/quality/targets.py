@@ -30,7 +30,7 @@ class Target:
         """Return least and most for one report.
 
         Args:
-            flat: the report, flat as by `report.flatten`.
+            flat: the report, flat as by `report.flatten_report`.
         Returns:
             None where there is no such bound or it is unknown.
         """

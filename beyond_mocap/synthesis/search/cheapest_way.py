@@ -88,7 +88,7 @@ class Ways:
         first = np.arange(len(least)) * count + np.argmin(least, axis=1)
         bound = self._whole(to, least, first)
         free = to.piece < 0
-        # no free candidate above the `most`-th best of all upper bounds can be kept
+        # no free candidate above the `kept_count`-th best of all upper bounds can be kept
         rivals = np.concatenate([bound[free], known - self.base])
         if len(rivals) > most:
             bound[free] = np.minimum(bound[free], np.partition(rivals, most - 1)[most - 1])

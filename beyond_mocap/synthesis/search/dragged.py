@@ -25,7 +25,7 @@ _TOLD = 4.0  # frames left out from which on it is reported
 def drags(library: Library, wanted: Wanted, at: float, key: Key, rate: float, low: int, high: int) -> bool:
     """Return whether a key's clip drags its feet for most of the frames low .. high.
 
-    Both feet are in contact for longer than in a walk, and the track is faster or slower than the clip by DRAGGED.
+    Both feet are in contact for longer than in a walk, and the track is faster or slower than the clip by DRAG_SPEED.
 
     Args:
         library: the clips.

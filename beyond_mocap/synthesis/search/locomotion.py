@@ -7,9 +7,9 @@ Decisions where the paper is vague or misprinted:
 - Step 7 takes the absolute value of the difference, so that distance could never be removed; here its sign is kept.
 - Eq. 22 and 23 drop alpha; here D and C are weighed as in eq. 14.
 - The steps that build S' run the same recursion for every end block; here it runs once for all, and the candidates are
-  read off every layer. Of the sequences within CLOSE of the requested distance the one with the lowest cost per block
-  wins (the paper's arg min of the distance alone takes bad transitions to win a millimetre); if none is, the nearest
-  one.
+  read off every layer. Of the sequences within DISTANCE_TOLERANCE of the requested distance the one with the lowest
+  cost per block wins (the paper's arg min of the distance alone takes bad transitions to win a millimetre); if none is,
+  the nearest one.
 """
 
 from __future__ import annotations
@@ -195,7 +195,7 @@ def _words_by_distance(search: BlockSearch, section: Section, blocks: Candidates
 
 
 def _read_chain(layers, back) -> np.ndarray:
-    """Read the best chain over all layers: cheapest per block within CLOSE metres, else nearest.
+    """Read the best chain over all layers: cheapest per block within DISTANCE_TOLERANCE metres, else nearest.
 
     Returns:
         Block indices in order.

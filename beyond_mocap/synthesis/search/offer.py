@@ -58,7 +58,7 @@ class Offer:
         turn: (R, N) rad over a slot.
         valid: (R, N) bool, whether the clip lasts that long and is allowed.
         by_speed: (K,) the valid pairs, flat indices into (R, N), in order of their speeds.
-        offset, long_stance: (N,), see `Pairs`.
+        offset, long_stance: (N,), see `RatePairs`.
         is_synthetic: (N,) bool, frames of synthetic clips.
         is_in_contact: (N, 2) bool, feet in contact.
         wild_before, wild_after: (N,), see `measure_wildness`.
@@ -141,7 +141,7 @@ def wildness(library: Library) -> tuple[np.ndarray, np.ndarray]:
     The jerk of a transition is measured over such windows (../shared/metrics.md).
 
     Returns:
-        (N,) and (N,) for the REACH frames before and after each frame, as a share; 0 where it does not exceed it.
+        (N,) and (N,) for the JERK_REACH frames before and after each frame, as a share; 0 where it does not exceed it.
     """
     frames = library.frames
     kind = np.digitize(frames.speed, _SPEED_CLASSES)

@@ -3,7 +3,7 @@
 Players out of step: players with similar tracks get the same clips, and where they begin them at the same time they
 move in unison. A clip that is played runs along with the clock: a player that shows its second s at time t of the match
 is s - t ahead of it, and this is the lag. Every player prefers lags that are PERIOD apart, and players who come near
-each other get different ones (`match.crowd.variety.lags`).
+each other get different ones (`match.crowd.variety.choose_lags`).
 
 Other clips: a search for another solution pays for frames that an earlier one has shown, and a little for other frames
 of the same clips. It is a cost, not a ban: where nothing else comes near the request, they are shown again.

@@ -62,7 +62,7 @@ def slot_edges(
 
     There is an edge midway between key moments that are close together, and one before and after each where the
     shortest of its clips begins and ends, so that a clip which does not fit its surroundings is not played longer than
-    it must be; none of these leaves a slot shorter than SHORTEST beside it.
+    it must be; none of these leaves a slot shorter than MIN_SLOT beside it.
 
     Args:
         library: the clips.
