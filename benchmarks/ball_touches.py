@@ -29,7 +29,7 @@ BY_HAND = ROOT / "benchmarks" / "touches_by_hand.csv"
 LATER = ROOT / "benchmarks" / "touches_by_hand_later.csv"
 EVENTS = DATA / "tracking" / "match" / "dutch_6min_events.csv"
 MARGIN = 20.0  # s that are solved before and after what was annotated
-PLAYED = ("pass", "miss", "clearance")  # events that are a touch for certain
+PLAYED = ("pass", "miss", "clearance")  # events that are certainly a touch
 _NO_TOUCH = ("out", "foul", "card", "offside")
 EVENT_SPREAD = 1.8  # s: three standard deviations of the time error of events that are not tied to a touch
 

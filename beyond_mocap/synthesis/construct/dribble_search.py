@@ -489,7 +489,7 @@ class Search:
                 path[frame + 1 : to] = rolled[: to - frame - 1]
             if node == _START:
                 return 0, last, path[: last + 1]
-            # walk to the begin of this push, then to the node from which the ball rolled here
+            # go back to the start of this push, then to the node from which the ball rolled here
             entered = int(self.pushed[node])
             first = int(self.frame[entered])
             held = np.flatnonzero(self._alike(node) & (self.frame >= first) & (self.frame <= frame))

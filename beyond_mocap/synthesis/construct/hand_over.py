@@ -1,7 +1,7 @@
 """Blend a constructed stretch with the motion around it, which stays: without a jump, and without a foot that slides.
 
 Around the stretch both motions show the same source frames, but what was solved over all frames (how far a foot is
-shifted, how low the pelvis is) may differ there by some centimetres. Root and joints are blended within the hand-over;
+shifted, how low the pelvis is) may differ there by some centimetres. Root and joints are blended at its ends;
 feet change over at once where they are in the air. A foot in contact at the border stays where the old motion has it
 until it lifts: its shift is `foot_plant.solve_shift` of a foot that does not move at all. Where both motions
 stay in place at different places, the feet step over (`step_over`).

@@ -137,7 +137,7 @@ def ball_gap(played: Played, moment: Moment) -> float:
     """Measure the distance between the striking surface and the surface of the written ball at a key moment.
 
     Measured at the output frame nearest to the requested time (`ball_contact.measure_contact_gap`, overlap counts as
-    distance too). The part is that of the labels that are played there; of the requested ones where those touch no ball.
+    distance too). The part is that of the labels played there; of the requested ones where those touch no ball.
 
     Returns:
         m, NaN without ball or part.

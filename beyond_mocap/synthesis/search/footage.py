@@ -161,7 +161,7 @@ def _around(library: Library, footage: Footage, edges: np.ndarray, reach: float)
     """Compute the overlap around one transition.
 
     Args:
-        edges: (3,) output frames: begin of the piece before, transition, end of the piece after.
+        edges: (3,) output frames: start of the piece before, transition, end of the piece after.
     Returns:
         Output frames, progress, whether behind the transition, and clip and frame that the other piece shows there.
     """
