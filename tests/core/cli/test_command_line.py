@@ -549,7 +549,7 @@ def test_pins_height_foot_and_style_are_a_players_own(synthesize, tmp_path):
     status, _, error = synthesize(
         "--strong-foot", "left", "--style", "kick*", report=tmp_path / "r.json", pins=tmp_path / "pins.csv", height=2.0
     )
-    assert status == 0 and any("99 s: the pin of left_hand lies outside" in line for line in error)
+    assert status == 0 and any("99 s: the pin of left_hand is outside" in line for line in error)
     report = json.loads((tmp_path / "r.json").read_text())
     assert [pin["part"] for pin in report["pins"]] == ["gaze", "left_hand"] and report["pins"][0]["miss"] < 0.05
     assert stature(bvh.read(tmp_path / "out.bvh", 0.01).motion.skeleton) == pytest.approx(2.0, abs=1e-3)

@@ -110,7 +110,7 @@ def test_a_track_between_two_recordings_is_played_by_a_blend(library):
 def test_a_track_beyond_the_recordings_is_played_by_made_running_and_told(library):
     take = synthesize(library, Plan(track=straight(min(1.5 * library.fastest, 9.0))))
     assert any(name.startswith(MADE_FOLDER) for name in take.clips)
-    assert any("made" in warning for warning in take.warnings)
+    assert any("synthetic" in warning for warning in take.warnings)
 
 
 def test_a_kick_in_a_sprint_is_made(library):
