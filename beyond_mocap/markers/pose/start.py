@@ -80,8 +80,8 @@ def _whole(rest: np.ndarray, seen: np.ndarray, share: np.ndarray) -> np.ndarray:
 
 
 def _about(arms: np.ndarray, seen: np.ndarray, share: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Fit the rotations (4, F) about a joint of arms (N, 3) to recorded ones (N, 3, F), with a pull to `before` (4,
-    F).
+    """Fit the rotations (4, F) about a joint of arms (N, 3) to recorded ones (N, 3, F), with a pull to `prior`
+    (4, F).
     """
     return _best(np.einsum("mf,maf,mb->abf", share, seen, arms) + _FAITH * matrices(before))
 
