@@ -21,8 +21,8 @@ TABLES = {
             "recording; default: the one that fits"),
         Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers to read if a "
             "file contains several bodies"),
-        Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="unit of the files: m, cm, mm, in; default: "
-            "as in the files", tooltip="Metres in one unit of a recording; 0 uses its file, or the body's size",
+        Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="unit of the files: m, cm, mm, in; "
+            "default: as in the files", tooltip="Metres in one unit of a recording; 0 uses its file, or the body's size",
             precision=4, panel_more=dict(default=0.0, min=0.0, max=10.0)),
         Setting(name="up", kind=str, option="--up", metavar="AXIS", help="axis of the files that points up: X, Y, Z or "
             "--up=-Y; default: detected"),
@@ -33,7 +33,7 @@ TABLES = {
         Setting(name="cutoff", default=13.4, least=0.1, most=1000.0, unit="hertz", option="--cutoff",
             help="of the filter; default %(default)g", tooltip="Cutoff of the Butterworth filter in hertz; "
             "faster movements are removed", precision=1, panel_more=dict(min=0.5, max=100.0)),
-        Setting(name="plant", default=True, option="--no-plant", help="do not hold feet on the ground", title="Plant Feet",
+        Setting(name="plant", default=True, option="--no-plant", help="do not hold feet in place", title="Plant Feet",
             tooltip="Hold feet in place while they touch the ground"),
         Setting(name="floor", default=False, option="--floor", help="move the motion up or down so that the floor is "
             "at 0", title="Floor at 0", tooltip="Move the body so that the floor under its feet is at height 0"),
@@ -58,7 +58,7 @@ TABLES = {
         Setting(name="add_to", kind=Path, option="--add-to", metavar="LIBRARY", help="add the motion to a library as "
             "NAME.bvh"),
         Setting(name="words", default=(), option="--words", metavar="WORD", help="labels of the added clip; a "
-            "throw has its key moment at the release", tooltip="Labels of the clip that is added", option_more=dict(nargs="+"),
+            "throw's key: release", tooltip="Labels of the clip that is added", option_more=dict(nargs="+"),
             panel_more=dict(default="throwb")),
         Setting(name="dressed", default=True, title="Add Body Mesh", tooltip="Give the armature a simple body mesh"),
         Setting(name="names", default=True, tooltip="Show the labels of the active marker cloud in the 3D view"),
@@ -73,8 +73,8 @@ TABLES = {
             panel_more=dict(default="AUTO")),
         Setting(name="ball", default="baseball", choices=THROWN, option="--ball-kind", identifier="thrown",
             tooltip="Kind of ball that is thrown"),
-        Setting(name="ball_csv", kind=Path, option="--ball-csv", metavar="B.csv", help="write the ball's trajectory over "
-            "the whole trial"),
+        Setting(name="ball_csv", kind=Path, option="--ball-csv", metavar="B.csv", help="write the ball's trajectory "
+            "over the whole trial"),
         Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="unit of the markers: metres per unit, or "
             "mm, cm, m, in"),
         Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers to read if a file "
