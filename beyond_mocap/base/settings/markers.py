@@ -22,7 +22,7 @@ TABLES = {
         Setting(name="subject", kind=str, option="--subject", metavar="NAME", help="whose markers to read if a "
             "file contains several bodies"),
         Setting(name="unit", kind=str, option="--unit", metavar="UNIT", help="unit of the files: m, cm, mm, in; "
-            "default: as in the files", tooltip="Metres in one unit of a recording; 0 uses its file, or the body's size",
+            "default: as in the files", tooltip="Metres in one unit of a recording; 0 uses its file or body size",
             precision=4, panel_more=dict(default=0.0, min=0.0, max=10.0)),
         Setting(name="up", kind=str, option="--up", metavar="AXIS", help="axis of the files that points up: X, Y, Z or "
             "--up=-Y; default: detected"),
