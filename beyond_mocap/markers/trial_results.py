@@ -32,7 +32,7 @@ class Throw:
         hips: (2,) metres, level, at the start.
         impact: (2,) metres, level, on the ground; None where the ball never came down.
         velocity: (3,) m/s.
-        how: "ball" or "hand", what the release was estimated from.
+        method: "ball" or "hand", what the release was estimated from.
     """
 
     speed: float
