@@ -104,13 +104,13 @@ def test_a_static_that_lacks_markers_is_told_or_refused(known, clusters):
 def test_markers_of_no_segment_are_told(known, clusters):
     assert unused(known.trial, clusters) == []
     strange = known.trial.renamed({"LWRA": "STICK", "RWRA": "*4"})
-    assert unused(strange, clusters) == ["1 markers of no segment are not used: STICK"]
+    assert unused(strange, clusters) == ["1 markers belong to no segment and are not used: STICK"]
     assert unused(strange, clusters, ["STICK"]) == []
 
 
 def test_a_static_in_which_nothing_is_seen_is_refused_as_that(known, clusters):
     for static in (known.static.with_positions(known.static.positions * np.nan), known.static.frames(0, 0)):
-        with pytest.raises(InputError, match="no marker is seen"):
+        with pytest.raises(InputError, match="no marker is visible"):
             check(known.trial, static, clusters)
 
 

@@ -57,7 +57,7 @@ def test_parts_of_a_trial():
     ({"start": float("inf")}, "starts at inf"),
     ({"residuals": np.ones((5, 2))}, "residuals of shape"),
     ({"positions": np.full((5, 3, 3), np.inf)}, "infinite"),
-    ({"positions": [["a"]]}, "no numbers"),
+    ({"positions": [["a"]]}, "not numbers"),
 ])  # fmt: skip
 def test_what_is_wrong_is_said(changes, said):
     with pytest.raises(InputError, match=said):

@@ -73,7 +73,7 @@ def test_a_set_is_chosen_by_name_or_file(tmp_path):
     ("segment Hip: A", "no segment 'Hip'"),
     ("segment: A", "x:11: 'segment'"),
     ("landmark nose: LASI", "no landmark 'nose'"),
-    ("landmark left_psis: LPSI", "which no segment carries"),
+    ("landmark left_psis: LPSI", "which is on no segment"),
     ("colour: red", "x:11: 'colour'"),
     ("segment Head: ", "x:11: no labels"),
     ("segment Head: A,,B", "an empty label"),

@@ -144,7 +144,7 @@ def test_a_marker_that_only_is_called_a_ball_is_left_aside(known):
 
 
 def test_markers_beside_the_motion_are_said(known):
-    with pytest.raises(InputError, match="beside the motion"):
+    with pytest.raises(InputError, match="away from the motion"):
         release(known.trial.with_positions(known.trial.positions + [5.0, 0.0, 0.0]), known.motion)
 
 
@@ -158,7 +158,7 @@ def test_no_throw_is_said(known):
 
 
 def test_another_trials_motion_is_said(known):
-    with pytest.raises(InputError, match="the motion that was made from this trial"):
+    with pytest.raises(InputError, match="the motion of this trial"):
         release(known.trial, known.motion.frames(0, 40))
 
 
