@@ -82,7 +82,7 @@ def test_one_marker_put_on_anew_is_told(known, clusters):
     moved[:, known.static.index("LWRA")] += [0.05, 0.0, 0.0]
     moved[:, known.static.index("LASI")] += [0.0, 0.06, 0.0]
     lines = check(known.trial, known.static.with_positions(moved), clusters)
-    assert len(lines) == 1 and "anew" in lines[0]
+    assert len(lines) == 1 and "attached again" in lines[0]
 
 
 def test_stretches_without_markers_are_told_with_their_seconds(known, clusters):

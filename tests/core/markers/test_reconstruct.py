@@ -73,7 +73,7 @@ def test_the_same_input_gives_the_same_bits(made, known):
 def test_the_motion_stays_where_the_markers_are_unless_a_floor_is_asked_for(known, made):
     lifted = known.trial.with_positions(known.trial.positions + [0.0, 0.0, 0.8])
     out = reconstruct(lifted, model=made.model)
-    assert out.floor == pytest.approx(0.8, abs=0.05) and any("--floor" in line for line in out.warnings)
+    assert out.floor == pytest.approx(0.8, abs=0.05) and any("Floor at 0" in line for line in out.warnings)
     assert np.allclose(out.motion.root_positions - made.motion.root_positions, [0.0, 0.0, 0.8], atol=5e-3)
     moved = reconstruct(lifted, model=made.model, settings=ReconstructSettings(floor=True))
     lowered = out.trial.positions - [0.0, 0.0, out.floor]

@@ -165,10 +165,10 @@ def set_line(number, change):
     (set_line(17, lambda line: line[:100]), "made.trc:18: .* the row is cut off"),
     (set_line(7, lambda line: line.replace("000\t1", "000\tI", 1)), "made.trc:8: 'I.*' in column 3; expected a num"),
     (set_line(9, lambda line: line.replace("0.030000", "0.010000")), "Time of frame 4 is 0.010000, after 0.020000"),
-    (set_line(9, lambda line: line.replace("0.030000", "0.035000")), "beside 100 frames per second.*resample"),
-    (set_line(17, lambda line: line.replace("0.110000", "99990.11")), "leave out 9999000 frames"),
+    (set_line(9, lambda line: line.replace("0.030000", "0.035000")), "off 100 frames per second.*resample"),
+    (set_line(17, lambda line: line.replace("0.110000", "99990.11")), "skip 9999000 frames"),
     (lambda lines: [line.replace("100.0\t", "0\t") for line in lines[:5]] + lines[6:7], "nan frames per second"),
-    (set_line(2, lambda line: line.replace("mm", "m")), "a body of 1507 m in the header's unit 'm'.*--unit"),
+    (set_line(2, lambda line: line.replace("mm", "m")), "a body of 1507 m in the header's unit 'm'.*set the unit"),
 ])  # fmt: skip
 def test_what_is_wrong_is_told(lines, read, change, said):
     with pytest.raises(InputError, match=said):

@@ -188,5 +188,5 @@ def test_the_verb_names_the_file_whose_motion_it_is_not(known, tmp_path, capsys)
     given = ["release", str(tmp_path / "t.trc"), "--motion", str(tmp_path / "m.bvh"), "--report"]
     assert main([*given, str(tmp_path / "r.json"), "--ball-csv", str(tmp_path / "b.csv")]) == 2
     told = capsys.readouterr().err.strip()
-    assert f"{tmp_path / 't.trc'}: " in told and "\n" not in told and "made from this trial" in told
+    assert f"{tmp_path / 't.trc'}: " in told and "\n" not in told and "the motion of this trial" in told
     assert len(list(tmp_path.iterdir())) == 2
