@@ -152,6 +152,7 @@ class BEYOND_MOCAP_OT_use_marker_set(OnMarkers, Verb, bpy.types.Operator):
     which: EnumProperty(name="Marker Set", items=shipped, description="Marker set to apply")
 
     def do(self, context):
+        """Apply the chosen set, and report what does not fit."""
         from ..beyond_mocap.markers.files.marker_set_text import shipped_sets
 
         thing = self.cloud(context)
@@ -172,6 +173,7 @@ class BEYOND_MOCAP_OT_load_marker_set(OnMarkers, ImportVerb, bpy.types.Operator)
     filter_glob: StringProperty(default="*.txt", options={"HIDDEN"})
 
     def do(self, context):
+        """Read the set and apply it, and report what does not fit."""
         from ..beyond_mocap.markers.files.marker_set_text import read_marker_set
 
         path = self.chosen_one("one marker set")
@@ -208,6 +210,7 @@ class BEYOND_MOCAP_OT_set_static(OnMarkers, Verb, bpy.types.Operator):
              lambda context: is_cloud(context.view_layer.objects.active) and len(clouds(context.scene)) > 1)
 
     def do(self, context):
+        """Set the static trial of the other clouds."""
         static = context.view_layer.objects.active
         others = [thing for thing in clouds(context.scene) if thing != static]
         chosen = [thing for thing in others if thing.select_get()] or others
@@ -272,6 +275,7 @@ class BEYOND_MOCAP_OT_clean_markers(OnMarkers, BackgroundVerb, bpy.types.Operato
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
+        """Clean the trial."""
         from ..beyond_mocap.markers.cleaning.clean import clean
 
         name, trial, clusters = order
@@ -303,6 +307,7 @@ class BEYOND_MOCAP_OT_reconstruct_markers(OnMarkers, BackgroundVerb, bpy.types.O
 
     @staticmethod
     def work(order, progress, cancelled, _hurry):
+        """Reconstruct the trial."""
         from ..beyond_mocap.markers.reconstruct import reconstruct
 
         made = reconstruct(order.trial, order.static, order.model, settings=order.settings, progress=progress,
@@ -337,6 +342,7 @@ class BEYOND_MOCAP_OT_find_release(OnMarkers, BackgroundVerb, bpy.types.Operator
 
     @staticmethod
     def work(order, progress, _cancelled, _hurry):
+        """Estimate the release."""
         from ..beyond_mocap.markers.release.release import release
 
         name, trial, motion, settings = order
@@ -344,6 +350,7 @@ class BEYOND_MOCAP_OT_find_release(OnMarkers, BackgroundVerb, bpy.types.Operator
         return name, release(trial, motion, settings)
 
     def apply(self, scene, result):
+        """Show the release, and report its figures."""
         name, found = result
         thing = scene.objects.get(name)
         if not is_cloud(thing):

@@ -20,6 +20,7 @@ class BEYOND_MOCAP_OT_add_stage(Verb, bpy.types.Operator):
     camera: BoolProperty(name="Camera", default=True, description="Add a camera and use it for rendering")
 
     def do(self, context):
+        """Create the stage."""
         stage.create(context, self.camera)
 
 
@@ -103,6 +104,7 @@ def _after(scene: bpy.types.Scene, area: bpy.types.Area | None) -> str:
 
 
 def _look_through(area: bpy.types.Area, before: bpy.types.Object | None, camera: bpy.types.Object) -> None:
+    """Look through a camera in a 3D view, and store the view from before the first path camera."""
     space = area.spaces.active
     view = space.region_3d
     if view.view_perspective != "CAMERA" or before is None or not before.get(path_cameras.MARK):

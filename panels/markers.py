@@ -15,6 +15,7 @@ class BEYOND_MOCAP_UL_markers(bpy.types.UIList):
     """The markers of a cloud."""
 
     def draw_item(self, _context, layout, _data, item, _icon, _active_data, _active_property):
+        """Draw a marker: label, segment or role, and how often it is visible."""
         row = layout.split(factor=0.38)
         row.prop(item, "name", text="", emboss=False)
         right = row.split(factor=0.64)

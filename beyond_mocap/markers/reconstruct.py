@@ -221,6 +221,7 @@ class _Road:
         self.warnings += [line for line in lines if line not in self.warnings]
 
     def check(self) -> None:
+        """Raise Cancelled if the user has stopped the job."""
         if self._cancelled is not None and self._cancelled():
             raise Cancelled("cancelled")
 

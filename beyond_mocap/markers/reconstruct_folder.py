@@ -133,6 +133,7 @@ class _Plan:
 
     @property
     def static_path(self) -> Path | None:
+        """Path of the static trial, or None."""
         return None if self.static is None else self.static[0].path
 
 

@@ -87,6 +87,7 @@ class Job:
         self._news.put(("progress", (fraction, text)))
 
     def _run(self, work: Work) -> None:
+        """Run the work in the thread, and send its result or error."""
         _work(1)
         try:
             result = work(self._tell, self._stop.is_set, self._soon.is_set)

@@ -116,6 +116,9 @@ class Watcher:
             self.mark()
 
     def _follow(self) -> float:
+        """Call `follow` for the scene of each window if the watcher is marked; return the seconds until the next
+        poll.
+        """
         if not self.dirty or bpy.app.is_job_running("RENDER"):
             return BUSY_TICK if perf_counter() - self.since < BUSY else TICK
         self.dirty, begun, scenes = False, perf_counter(), set()
@@ -128,6 +131,7 @@ class Watcher:
         return max(BUSY_TICK, SHARE * (perf_counter() - begun))
 
     def _settle(self) -> float:
+        """Call `settle` if the watcher is marked and the user is idle; return the seconds until the next poll."""
         shown = next(iter(bpy.context.window_manager.windows), None)
         if not self.dirty or shown is None or bpy.app.is_job_running("RENDER"):
             return TICK
@@ -252,6 +256,7 @@ def stop_watching() -> None:
 
 
 def _handler(what: str, count: int) -> Callable:
+    """Build the handler that passes an event to all watchers."""
     @persistent
     def call(*arguments):
         for watcher in _watchers:

@@ -206,6 +206,7 @@ def _inside(rect: Rect, x: float, y: float) -> bool:
 
 
 def _fill(rect: Rect, color: Sequence[float]) -> None:
+    """Draw a filled rectangle."""
     import gpu
     from gpu_extras.batch import batch_for_shader
 

@@ -123,6 +123,7 @@ def largest_editor(screen: bpy.types.Screen, kind: str) -> bpy.types.Area | None
 
 
 def _split(context, window, kind: str, direction: str, factor: float) -> bpy.types.Area | None:
+    """Split the largest 3D view; return the new editor, or None without a 3D view."""
     view = largest_editor(window.screen, "VIEW_3D")
     if view is None:
         return None

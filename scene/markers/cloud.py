@@ -273,6 +273,7 @@ def visible_labels(context: bpy.types.Context) -> list[tuple[Vector, str, tuple]
 
 
 def _draw_labels() -> None:
+    """Draw the visible labels into the 3D view, without overlaps."""
     import blf
 
     context = bpy.context

@@ -182,6 +182,7 @@ def _own(stage: bpy.types.Collection) -> list[bpy.types.Object]:
 
 
 def _camera(stage, units: float) -> bpy.types.Object:
+    """Create the camera with the empty that it looks at and moves with."""
     focus = place_object(stage, FOCUS, None)
     focus.empty_display_size = 0.5 * units
     focus.location = (0.0, 0.0, 0.9 * units)

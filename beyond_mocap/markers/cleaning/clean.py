@@ -228,6 +228,7 @@ class _Work:
         self.carried = carriers(self.positions, self.soft, named, known=self.carried, changed=changed, ask=self.ask)
 
     def seen(self, marker):
+        """Return whether a marker is visible in any frame."""
         return np.isfinite(self.positions[:, marker, 0]).any()
 
     def stretch(self, labels, first, end, how="", off=0.0, frames=None):
@@ -285,6 +286,7 @@ def _go_on(cancelled):
 
 
 def _swaps(work):
+    """Exchange swapped labels back: first pairs that leap twice, then those that deform clusters."""
     work.positions, found = there_and_back(work.positions, work.carried)
     _note_swaps(work, found)
     leaping = leaps(work.positions, work.carried, work.trial.fps)
@@ -331,6 +333,7 @@ def _names(work):
 
 
 def _gaps(work, settings):
+    """Report markers that stray, fill the gaps, and record which are filled and which stay open."""
     longest = Longest(settings.longest_gap, settings.longest_soft_gap, settings.longest_spline)
     work.found["strayed"] = tuple(_strayed(work))
     work.positions, found = fill(work.positions, work.soft, work.trial.fps, longest=longest, known=work.carried,

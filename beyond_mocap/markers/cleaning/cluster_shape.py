@@ -53,6 +53,7 @@ def mean_shape(positions: np.ndarray) -> Shape:
         fit = rigid_fit(places, chosen, weights)
         back = taken_back(fit, chosen)
         away = np.linalg.norm(back - places, axis=-1)
+        # Geman-McClure weights; a marker without a place in the shape yet gets a tiny one, to enter it
         scale = 3.0 * max(median(away), 1e-4)
         weights = np.where(np.isfinite(away), 1.0 / (1.0 + (away / scale) ** 2) ** 2, np.isfinite(back[..., 0]) * 1e-3)
         weights = np.where(fit.sound[:, None], weights, 0.0)

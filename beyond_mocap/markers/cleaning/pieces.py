@@ -89,6 +89,7 @@ def pieces(positions: np.ndarray, leaping: np.ndarray) -> list[Piece]:
     found = []
     for marker in range(positions.shape[1]):
         there = np.concatenate([[False], seen[:, marker], [False]])
+        # a piece begins after a frame without sight or at a leap, and ends before one
         begins = there[1:-1] & (~there[:-2] | leaping[:, marker])
         firsts = np.flatnonzero(begins)
         ends = np.flatnonzero(there[1:-1] & (~there[2:] | np.append(leaping[1:, marker], False))) + 1

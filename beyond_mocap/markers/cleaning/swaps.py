@@ -249,6 +249,7 @@ def _strayed(positions, carried, fps):
         bad = np.flatnonzero(off[frame])
         across = np.linalg.norm(where[frame, bad][:, None] - told[frame, bad][None], axis=-1)
         own = np.diagonal(across)
+        # (i, j): marker i lies where the carriers of j predict j, and clearly nearer than to its own place
         better = (across < reach[bad][None]) & (across < 0.5 * own[:, None])
         for i, j in np.argwhere(np.triu(better & better.T, 1)):
             found[(markers[bad[i]], markers[bad[j]])] = None

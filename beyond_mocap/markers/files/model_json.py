@@ -176,17 +176,20 @@ def _freedom(joints) -> Freedom:
 
 
 def _three(value, where: str) -> list:
+    """Return a list of three values; raise InputError for anything else."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(where, f"{len(value)} values" if isinstance(value, list) else "no list", "three values")
     return value
 
 
 def _column(rows, what: str, name: str, usual: float) -> np.ndarray:
+    """Read one number from each row; `usual` where it is missing."""
     return np.array([usual if row.get(name) is None else number(row[name], f"{what} {i}: {name}")
                      for i, row in enumerate(rows, 1)])  # fmt: skip
 
 
 def _ball(value, index) -> BallMarker | None:
+    """Read the ball marker; None where there is none."""
     if value is None:
         return None
     names = ("label", "joint", "centre", "radius")
@@ -199,6 +202,7 @@ def _ball(value, index) -> BallMarker | None:
 
 
 def _index(value, where: str, index: dict[str, int]) -> int:
+    """Return the index of a joint by its name; raise InputError where it does not exist."""
     name = text(value, where)
     if name not in index:
         raise InputError(where, f"no joint {name[:40]!r}", "one of the joints", "check the spelling")
@@ -212,6 +216,7 @@ def _places(rows, what: str, name: str) -> np.ndarray:
 
 
 def _place(value, where: str) -> tuple[float, float, float]:
+    """Read a place of three coordinates in metres."""
     place = numbers(value, where, 3, _TRIPLE)
     if max(map(abs, place)) > _FARTHEST:
         raise InputError(where, f"{max(place, key=abs):g} m", "metres within a body", "check the unit")

@@ -93,6 +93,7 @@ class _Head:
 
     @property
     def unit(self) -> str:
+        """Unit in the header, "" without one."""
         return self.values.get("units", "")
 
     def number(self, name: str) -> float:

@@ -320,6 +320,7 @@ class Adjustment:
         for joint, parent in enumerate(body.parents):
             if body.held[joint]:
                 continue
+            # limited rotation about the world's axes
             turn = quaternion.to_matrix(quaternion.from_rotation_vector(turns[:, joint]))
             # the rotation of this joint alone, converted from world axes to the parent's frame
             above = world[:, parent] if parent >= 0 else np.broadcast_to(np.eye(3), turn.shape)

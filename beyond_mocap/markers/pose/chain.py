@@ -194,6 +194,7 @@ def angles_of(chain: Chain, joint: int, local: np.ndarray) -> np.ndarray:
     Two triples of angles describe each rotation; the one within the limits, or nearer to them, is returned.
     """
     one = quaternion.to_euler(local.T, chain.order[joint]).T
+    # the second triple of angles of the same rotation
     other = np.stack([one[0] + np.pi, np.pi - one[1], one[2] + np.pi])
     one, other = (_near_the_middle(chain, joint, angles) for angles in (one, other))
     better = _offence(chain, joint, other) < _offence(chain, joint, one) - 1e-9

@@ -99,6 +99,7 @@ def hold(chain: Chain, joints: dict[str, np.ndarray], at: Poses, slope: np.ndarr
     """
     low, high = chain.low[..., None], chain.high[..., None]
     stops = np.zeros(at.angles.shape, dtype=bool)
+    # the nearer limit of each angle; an infinite one counts as beyond any angle (9 rad)
     bound = np.where(at.angles > 0.5 * (np.maximum(low, -9.0) + np.minimum(high, 9.0)), high, low)
     touching = ((at.angles >= high - _AT) | (at.angles <= low + _AT)) & chain.free[..., None]
     if ahead is not None:
@@ -126,9 +127,11 @@ def _hold_joint(chain, joint, angles, touching, bound, slope, stops, own) -> Non
     else:
         basis = rates = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, len(frames)))
         means = np.broadcast_to(chain.free[joint][:, None], here.shape)
+    # derivative of the cost by each angle: pulled outwards if it falls beyond the limit
     along = np.einsum("abf,af->bf", basis, slope[:, frames])
     outward = np.where(here >= chain.high[joint][:, None] - _AT, along < 0.0, along > 0.0)
     stops[:, frames] = ((touching[:, frames] & outward) | stops[:, frames]) & means
+    # fix an angle by a very stiff term that moves it onto its limit
     strength = np.where(stops[:, frames], _HELD, 0.0)
     short = np.where(stops[:, frames], here - bound[:, frames], 0.0)
     own.curvature[joint][..., frames] += np.einsum("naf,nbf,nf->abf", rates, rates, strength)
@@ -162,6 +165,7 @@ def along(chain: Chain, held: np.ndarray, at: Poses, turns: np.ndarray, further:
 def _inverse(basis: np.ndarray) -> np.ndarray:
     """Invert the axes (3 components, 3, F): how each angle grows with a rotation, (3 angles, 3 components, F)."""
     columns = basis[:, 0], basis[:, 1], basis[:, 2]
+    # inverse of a 3x3 matrix by cross products of its columns, over their determinant
     rows = np.stack([cross(columns[1], columns[2]), cross(columns[2], columns[0]), cross(columns[0], columns[1])])
     size = np.einsum("af,af->f", columns[0], rows[0])
     return rows / np.where(np.abs(size) < 1e-3, np.copysign(1e-3, size), size)

@@ -225,18 +225,21 @@ class _Solving:
         known = np.flatnonzero(self.there.sum(axis=1) >= max(_FEWEST, int(np.ceil(_ENOUGH * ever))))
         if not len(known):
             raise InputError("trial", "no frame shows enough markers", f"{_ENOUGH:.0%} of {ever}", "clean it first")
+        # frames solved first: every sixtieth of a second, and the last one
         spacing = max(1, int(round(self.fps * _COARSE_SECONDS)))
         coarse = np.unique(np.append(known[::spacing], known[-1]))
         self.work = len(known)
         start = first_poses(self.chain, self.seen[..., coarse], self.weights[coarse].T)
         for part in self._chunks(coarse):
             self._keep(coarse[part], descend(self._task(coarse[part]), start.frames(part)))
+        # retry doubtful frames from the neighbour before, then from the neighbour after
         for source, frames in ((coarse[:-1], coarse[1:]), (coarse[1:], coarse[:-1])):
             doubtful = self._doubtful(frames, source)
             self._better_from(source[doubtful], frames[doubtful])
         unsure = np.flatnonzero(self.missing[coarse].any(axis=1))
         if len(unsure):
             self._solve_between(coarse[unsure], coarse)
+        # then all frames between, from both solved neighbours
         others = np.setdiff1d(known, coarse)
         if len(others):
             self._solve_between(others, coarse)
@@ -252,6 +255,7 @@ class _Solving:
         """
         local = self.poses.local[..., known]
         near = np.abs(np.einsum("jaf,jaf->jf", local[..., 1:], local[..., :-1]))
+        # |dot product| of quaternions is the cosine of half the rotation between two frames
         jumps = np.flatnonzero(np.any(near < np.cos(0.5 * _FLIP), axis=0))
         suspect = np.zeros(len(known), dtype=bool)
         for first, last in zip(jumps[:-1], jumps[1:]):

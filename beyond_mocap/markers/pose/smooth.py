@@ -45,6 +45,7 @@ def smooth(task: Task, start: Poses, seconds: float, fps: float, watch=lambda pa
         window = np.arange(first - given, min(first + _KEPT + _AHEAD, total))
         solved, stopped = _window(task.frames(window), at.frames(window), strength, given)
         at.put(window, solved)
+        # the look-ahead is overwritten by the next window
         held[:, window[given:]] = stopped[:, given:]
     return at, held
 

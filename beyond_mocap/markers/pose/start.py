@@ -33,6 +33,7 @@ def first_poses(chain: Chain, seen: np.ndarray, weights: np.ndarray, guess: Pose
     local[:, 0] = 1.0
     lean = local.copy() if guess is None else guess.local
     angles = np.zeros((len(skeleton), 3, frames))
+    # markers have less weight the more joints they lie below
     share = weights * _BEYOND ** distance[0][:, None]
     world = [_whole(rest, seen, share)]
     middle = _mean(rest, share), _mean(seen, share)

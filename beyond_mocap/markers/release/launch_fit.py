@@ -163,6 +163,7 @@ class _Search:
         tau = self.times[used] - t0
         wanted = self.marker[used] - self.air[used]
         wanted[:, 2] += 0.5 * self.ball.gravity * tau**2
+        # columns 1, t, cos(w t) and sin(w t) of eq. 6.3 for each spin rate w
         basis = np.empty((len(rates), count, 4))
         basis[..., 0], basis[..., 1] = 1.0, tau
         basis[..., 2], basis[..., 3] = np.cos(rates[:, None] * tau), np.sin(rates[:, None] * tau)
@@ -228,6 +229,7 @@ class _Search:
             rates = np.maximum(flight.rate + np.linspace(-width, width, 21), 1e-3)
             flight = self.flight(t0, end, rates) or flight
             width = max(width / 5.0, 0.05)
+            # release times are refined in ever smaller steps around the best
             step = (1.0, 0.5, 0.25, _FINE)[turn] / self.fps
             tried = [(self.flight(t, end, np.array([flight.rate])), t) for t in t0 + step * np.arange(-3, 4)]
             flight, t0 = min(((f, t) for f, t in [*tried, (flight, t0)] if f is not None), key=lambda ft: ft[0].cost)
