@@ -290,7 +290,7 @@ def test_a_static_trial_that_was_deleted_is_not_used(walk):
     for collection in still.users_collection:
         collection.objects.unlink(still)
     bpy.context.view_layer.objects.active = trial
-    with pytest.raises(RuntimeError, match="static trial static is gone"):
+    with pytest.raises(RuntimeError, match="static trial static is not in the scene"):
         bpy.ops.beyond_mocap.reconstruct_markers()
 
 
