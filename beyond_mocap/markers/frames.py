@@ -22,7 +22,7 @@ class RigidFit(NamedTuple):
         rotation: (..., 3, 3) right-handed rotation matrices.
         shift: (..., 3) metres.
         rms: (...,) metres, root of the weighted mean squared distance.
-        sound: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly on one
+        is_determined: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly on one
             line); the rotation is then one of many that fit equally well.
     """
 

@@ -81,7 +81,7 @@ class CleanReport:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Messages for people, the most serious first; each has its seconds (`errors.spans_of`)."""
+        """Messages for people, the most serious first; each has its seconds (`errors.line_spans`)."""
         return (*(_swapped(swap) for swap in self.swaps),
                 *(_timed(f"{one.labels[0]} labeled as {one.labels[1]} {one.when()}", [one]) for one in self.assigned),
                 *_by_label(self.jumps, "jumping frames removed"),

@@ -37,7 +37,7 @@ class Body:
         offsets: (J, 3) metres, each joint in its parent's frame.
         joint: (M,) index of the joint that carries each marker.
         places: (M, 3) metres in that joint's frame.
-        held: (J,) bool, joints that do not turn.
+        is_fixed: (J,) bool, joints that do not turn.
         limb: (J,) axis (0, 1, 2) along which the bone to this joint lies exactly, -1 where it may have any direction.
     """
 
@@ -59,7 +59,7 @@ class Prior:
         offset_sigma: (J,) metres.
         places: (M, 3) metres.
         place_sigma: (M,) metres.
-        sides: metres by which left and right bones may differ.
+        side_sigma: metres by which left and right bones may differ.
     """
 
     offsets: np.ndarray
