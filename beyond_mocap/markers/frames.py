@@ -22,8 +22,8 @@ class RigidFit(NamedTuple):
         rotation: (..., 3, 3) right-handed rotation matrices.
         shift: (..., 3) metres.
         rms: (...,) metres, root of the weighted mean squared distance.
-        is_determined: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly on
-            one line); the rotation is then one of many that fit equally well.
+        is_determined: (...,) bool, False where the markers do not determine the rotation (fewer than three, or nearly
+            on one line); the rotation is then one of many that fit equally well.
     """
 
     rotation: np.ndarray
