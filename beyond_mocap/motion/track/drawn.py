@@ -80,7 +80,7 @@ def moved(times: np.ndarray, places: np.ndarray, name: str = "track") -> Track:
     """
     times, places = np.asarray(times, dtype=float), np.asarray(places, dtype=float)
     if len(times) < 2 or times[-1] - times[0] < 0.2:
-        raise InputError(name, "moves for less than 0.2 s", "an animated object", "add keyframes or choose a longer range")
+        raise InputError(name, "moves for less than 0.2 s", "an animated object", "add keyframes or a longer range")
     count = max(int(round((times[-1] - times[0]) * HZ)), 5)
     even = np.linspace(times[0], times[-1], count + 1)
     places = interpolate(even, times, places)
