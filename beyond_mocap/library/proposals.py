@@ -45,9 +45,10 @@ _FOOT_SECONDS = 0.012  # seconds over which a foot's speed is averaged: a kick's
 # a kick's foot is faster against the pelvis than this, and than a stride at the pelvis's speed v: m/s, share of v, m/s
 _KICK, _STRIDE, _ABOVE_STRIDE = 6.5, 1.25, 3.5
 _KICK_BEFORE, _KICK_AFTER = 0.25, 0.25  # seconds of a kick around its key moment
-_RUNNING, _HIGH, _INSIDE = 2.0, 0.40, 0.65  # m/s of the pelvis; m above the floor; cosine of the foot's path and its inner side
+# m/s of the pelvis; m above the floor; cosine of the foot's path and its inner side
+_RUNNING, _HIGH, _INSIDE = 2.0, 0.40, 0.65
 _UPRIGHT = 0.5  # share of the trunk's direction that points up
-_FLIGHT, _FALLS = 0.26, 0.6  # seconds without contact; share of the rise and fall of free flight that the pelvis has to show
+_FLIGHT, _FALLS = 0.26, 0.6  # seconds without contact; least rise of the pelvis, share of that of free flight
 _NOD = 1.0  # m/s of the head against the chest, forward: jumps without a ball have up to 0.5
 _TURN_RATE, _TURN = np.radians(45.0), np.radians(50.0)
 _TURN_SPEED = 2.0  # m/s: a body that travels faster runs a curve

@@ -59,7 +59,7 @@ def find_recordings(folder: str | Path, endings: tuple[str, ...] = (".bvh", *FOR
         found += [Path(here) / name for name in files if name.lower().endswith(endings)]
     for path in found:
         if str(path.relative_to(folder)).encode("utf-8", "replace").decode() != str(path.relative_to(folder)):
-            raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name that fits in a table", "rename the file")
+            raise InputError(ascii(str(path)), "a name that is not UTF-8", "a name in UTF-8", "rename the file")
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 

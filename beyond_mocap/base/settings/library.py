@@ -8,8 +8,8 @@ from .setting import POSITIVE, Setting
 TABLES = {
     "library": (
         Setting(name="cache", kind=Path, option="--cache", metavar="DIR", help="folder of the library's cache"),
-        Setting(name="skeleton", kind=Path, option="--skeleton", metavar="CLIP.bvh", help="clip with the skeleton of the "
-            "library"),
+        Setting(name="skeleton", kind=Path, option="--skeleton", metavar="CLIP.bvh", help="clip with the library's "
+            "skeleton"),
         Setting(name="unit", kind=float, option="--unit", help="metres per unit of the BVH files",
             identifier="library_unit", title="Metres per Unit", tooltip="Size of one unit of the clips in metres; 0 "
             "guesses it from the height of the hips", precision=5, **POSITIVE,

@@ -23,8 +23,8 @@ LIMIT = 1.5
 """Scores are clipped at this value: beyond it they carry no information."""
 
 PRIOR = {True: (5.0, 2.5, 1.3), False: (5.0, 0.0, 1.0)}
-"""Weights of score, rule (its confidence; minus `estimate_silence_weight` where it proposes nothing) and 1; for acts that
-the rules know, and for others."""
+"""Weights of score, rule (its confidence; minus `estimate_silence_weight` where it proposes nothing) and 1; for acts
+that the rules know, and for others."""
 
 _PRIOR_SPREAD = np.array([0.7, 0.7, 0.3])
 

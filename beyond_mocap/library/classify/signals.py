@@ -25,7 +25,7 @@ MIDDLE, PAIRED = ("chest", "head"), ("hand", "elbow", "knee", "ankle", "toe")
 """Points by name: those without a side, and those with a left and a right one."""
 
 _SMOOTH = 0.015  # seconds over which positions are smoothed before taking velocities
-_REACH = 0.12  # seconds by which velocities are multiplied, so that they are lengths like the positions (`library.features`)
+_REACH = 0.12  # seconds by which velocities are multiplied, to be lengths like the positions (`library.features`)
 STRIKES = ("foot", "hand", "head", "pelvis up", "pelvis down")
 """Signals with a peak, at the recording's own rate, where something is struck, caught or cleared: the faster foot's and
 the faster hand's speed, the head's forward speed against the chest, the pelvis's height and its negative."""

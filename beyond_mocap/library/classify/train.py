@@ -21,8 +21,10 @@ from .examples import Example, act_of
 from .kernel import Kernel, compute_confidence, fit_confidence, fit_kernel, weigh_silence
 from .signals import Space, windows
 
-_COMPONENTS, _FOLDS, _MOST = 80, 5, 4000  # components of a window; folds of the clips; windows of each class for one act, at most
-_KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1  # seconds around a key that show the act; that count as neither; that count as neither at a stretch's ends
+# components of a window; folds of the clips; most windows of each class for one act
+_COMPONENTS, _FOLDS, _MOST = 80, 5, 4000
+# seconds around a key that show the act; around a key, and around a stretch's ends, that count as neither
+_KEY, _GUARD, _EDGE = 0.07, 0.2, 0.1
 _MARGIN = 0.1  # F1 by which a stretch's detection has to be better than the rules'
 _EVERY = 5  # step between the samples of a stretch that are used for its confidence and labels
 _WINDOWS = 60000  # windows from which the space is built, at most: half a gigabyte
