@@ -271,7 +271,7 @@ def _playing(context) -> list[bpy.types.Object]:
     """List the selected armatures that play an action of this file; InputError where there are none."""
     rigs = [thing for thing in context.selected_objects if thing.type == "ARMATURE" and channels.playing(thing)[0]]
     if not rigs:
-        raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select them first")
+        raise InputError("assets", "no selected armature plays an action", "armatures with motions", "select some")
     for rig in rigs:
         if channels.playing(rig)[0].library is not None:
             raise InputError(rig.name, "its action belongs to another file", "actions of this file")

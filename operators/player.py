@@ -84,7 +84,7 @@ SkillCorner, Sportec, Second Spectrum, Stats Perform). A text file with the name
                 strips.write(context, player, words)
                 self.tell_words(context.scene, player, words)
             elif not player.feed_id:
-                self.report({"INFO"}, f"{player.name}: no label file beside the track; gaits follow the speed until you add labels")
+                self.report({"INFO"}, f"{player.name}: no label file beside the track; gaits follow its speed")
         except InputError as error:
             self.report({"WARNING"}, str(error))
 

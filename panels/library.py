@@ -108,7 +108,7 @@ def draw_assets(layout, listing) -> None:
     """Draw buttons that make assets of clips."""
     column = layout.column(align=True)
     column.operator("beyond_mocap.make_assets", text="Chosen Clip, This File", icon="ASSET_MANAGER").which = "CHOSEN"
-    for apart, text, icon in ((False, "Listed, This File", "ASSET_MANAGER"), (True, "Listed, New File...", "FILE_BLEND")):
+    for apart, text, icon in ((False, "Listed, This File", "ASSET_MANAGER"), (True, "Listed, New File", "FILE_BLEND")):
         button = column.operator("beyond_mocap.make_assets", text=f"{len(listing.shown)} {text}", icon=icon)
         button.which, button.apart = "SHOWN", apart
     column.operator("beyond_mocap.make_assets", text="Selected Armatures", icon="ARMATURE_DATA").which = "SELECTED"

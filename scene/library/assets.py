@@ -150,7 +150,7 @@ def define_catalogs(folder: str | Path, catalogs: Iterable[str]) -> Path:
     try:
         text = target.read_text("utf-8") if target.is_file() else _HEAD
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "correct or remove the file") from None
+        raise InputError(target, f"cannot be read ({error})", "Blender's catalogs", "remove the file") from None
     new = [name for name in sorted({TOP, *catalogs}) if catalog_id(name) not in text]
     if not new:
         return target

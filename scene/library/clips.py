@@ -294,7 +294,7 @@ def _begin(folder: str) -> None:
 def _take_in(manager: bpy.types.WindowManager, setting: str) -> None:
     """Write the scan's result if it is new, and redraw."""
     listing = manager.beyond_mocap_clips
-    if _looking["folder"] != absolute(setting) or "files" not in _looking["saw"]:  # the folder changed meanwhile, or the scan failed
+    if _looking["folder"] != absolute(setting) or "files" not in _looking["saw"]:  # stale, or the scan failed
         return
     saw = _looking["saw"]["files"]
     missing = saw is None

@@ -195,7 +195,7 @@ def _sampled(path: Path, scene: bpy.types.Scene, rig: bpy.types.Object, action, 
         scene.frame_set(int(np.floor(time)), subframe=float(time - np.floor(time)))
         rig.pose.bones.foreach_get("matrix", posed[number].reshape(-1))
         world[number] = np.array(rig.matrix_world)
-    matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender's matrices are read column by column
+    matrices = world[:, None] @ posed[:, order].transpose(0, 1, 3, 2).astype(float)  # Blender stores columns
     if not np.all(np.isfinite(matrices)):
         raise InputError(path, f"NaN or infinite values in action {action.name}", "an intact file", "export it again")
     return Take(action.name, _motion(path, rig, bones, matrices=matrices, world=world[0], fps=fps))

@@ -87,7 +87,7 @@ def line_of(scene: bpy.types.Scene, drawn: bpy.types.Object) -> Line:
     """
     spline = next((spline for spline in drawn.data.splines if len(points_of(spline)) > 1), None)
     if spline is None:
-        raise InputError(f"curve {drawn.name}", "fewer than two points", "two points or more", "add points in edit mode")
+        raise InputError(f"curve {drawn.name}", "fewer than two points", "a line", "add points in edit mode")
     if spline.use_cyclic_u:
         raise InputError(f"curve {drawn.name}", "a closed curve", "a curve with two ends", "switch Cyclic off (Alt-C)")
     points = points_of(spline)
