@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class FolderVerb(BackgroundVerb):
     """Base of operators about the library's folder."""
 
-    needs = "Choose the library folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
+    needs = "Choose the library's folder first", lambda context: bool(context.scene.beyond_mocap.library_folder)
 
 
 class ClipVerb(Verb):

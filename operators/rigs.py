@@ -169,7 +169,7 @@ planted; the rig's previous action is kept"""
         settings = context.scene.beyond_mocap
         players = [player for player in settings.players if player.use and player.body is not None]
         if not players:
-            raise InputError("bake to rig", "no selected player has a body", "players with a result", "synthesize first")
+            raise InputError("bake to rig", "no selected player has a body", "a result", "synthesize first")
         lacking = [player for player in players if player.rig is None]
         if lacking:
             check(settings.rig.target)
@@ -268,7 +268,7 @@ stays unchanged"""
     bl_label = "Export Motion"
     filter_glob: StringProperty(default="*.fbx;*.glb;*.usdc;*.bvh", options={"HIDDEN"})
     format: EnumProperty(name="Format", items=rig.FORMATS, default="FBX", description="Format of the file")
-    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program whose axes and units are used")
+    engine: EnumProperty(name="For", items=rig.ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=rig.WHO, default="ACTIVE", description="Armatures to export")
     root: EnumProperty(name="Root Motion", items=rig.ROOTS, default="KEEP", description="Motion of the root bone")
     own_rate: BoolProperty(name="Take Rate", default=False, description="Export at the frame rate of the take")

@@ -31,7 +31,7 @@ in the Item tab (Alt-S); the player waits at points of speed 0"""
         drawn = drawn_track.create(context, f"{name} curve", context.collection)
         add_player(context, drawn, name)
         window.select_only(context, drawn)
-        self.report({"INFO"}, f"{name}: edit the curve in edit mode (Tab), set the speeds of its points, then press Synthesize")
+        self.report({"INFO"}, f"{name}: edit the curve (Tab), set the speeds of its points, then press Synthesize")
 
 
 def add_player(context, drawn: bpy.types.Object, name: str):
@@ -119,7 +119,7 @@ with G; set time and hold in the list of pins"""
     bl_label = "Add Pin"
     part: bpy.props.EnumProperty(name="Part", items=pins.PARTS, description="Part of the body to pin")
     at: bpy.props.EnumProperty(
-        name="At", items=(("BODY", "Body", "Current position of the part"), ("CURSOR", "3D Cursor", "Position of the 3D cursor")),
+        name="At", items=(("BODY", "Body", "Current position of the part"), ("CURSOR", "3D Cursor", "3D cursor")),
         description="Position of the new pin",
     )
     hold: bpy.props.FloatProperty(name="Hold", default=0.0, min=0.0, precision=2, unit="TIME_ABSOLUTE",

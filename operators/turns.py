@@ -64,7 +64,7 @@ class TurnsVerb(Verb):
     """Base of operators that generate takes. `list_requests(context)`: pairs of a player and the mode of its request.
     """
 
-    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Name of one player; empty for all selected players")
+    player: StringProperty(name="Player", options={"SKIP_SAVE"}, description="Name of a player; empty for all selected")
     kind = "whole"
     needs = (*NEEDS_LIBRARY, "Import tracking and select a player in step 2 first",
              lambda context: any(player.use for player in context.scene.beyond_mocap.players))
@@ -193,7 +193,7 @@ class TurnsVerb(Verb):
             return True
         window = next((window for window in context.window_manager.windows if window.scene == scene), None)
         if window is None or _holds(context):
-            self.show(context, f"Ready; waiting for scene {scene.name}" if window is None else "Ready; finish the current transform")
+            self.show(context, f"Ready; waits for scene {scene.name}" if window is None else "Finish the transform")
             return False
         player = _asking(scene, entry)
         if player is None:
@@ -275,7 +275,7 @@ class TurnsVerb(Verb):
 def _kept(players) -> str:
     """Describe how many hand-made keys these players' results have kept."""
     count = sum(player.result.hand_keys for player in players)
-    return f", {count} edited {'key' if count == 1 else 'keys'} kept" if count else ""
+    return f", {count} hand-made {'key' if count == 1 else 'keys'} kept" if count else ""
 
 
 def _library(entry: queue.Entry):

@@ -18,7 +18,7 @@ from ...beyond_mocap.motion import quaternion
 
 TRIALS = 4
 RIDES = 2e-4
-"""Tolerance of a control's frame within its carrier: of a rotation matrix's entries, and in shares of the rig's size."""
+"""Tolerance of a control's frame within its carrier: of a rotation matrix's entries, and as share of the rig's size."""
 
 STATIC = -1
 _TURN, _WAY = 0.5, 0.05  # random rotation in radians, random shift as a share of the rig's size

@@ -104,7 +104,7 @@ class Fit:
         short = np.where(points.any(axis=2), miss, 0.0) if miss is not None else np.zeros((1, 2))
         for side, name in enumerate(("left", "right")):
             if short[:, side].max(initial=0.0) > _MISS:
-                lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm too short for its target in "
+                lines.append(f"the {name} leg is up to {1000 * short[:, side].max():.0f} mm short of its target in "
                              f"{int(np.sum(short[:, side] > _MISS))} frames")
         return lines
 

@@ -117,7 +117,7 @@ class BeyondMocapRig(bpy.types.PropertyGroup):
     turn_tolerance: FloatProperty(name="Angle", default=0.00872665, min=0.0001, max=0.5, subtype="ANGLE",
                                   description="Angle that a bone may be off after keys are removed")
     format: EnumProperty(name="Format", items=FORMATS, default="FBX", description="File format to export")
-    engine: EnumProperty(name="For", items=ENGINES, default="BLENDER", description="Program whose axes and units are used")
+    engine: EnumProperty(name="For", items=ENGINES, default="BLENDER", description="Program to export for")
     who: EnumProperty(name="Export", items=WHO, default="ACTIVE", description="Armatures to export")
     own_rate: BoolProperty(name="Take Rate", default=False,
                            description="Export at the frame rate of the take instead of the scene's")

@@ -338,7 +338,7 @@ def test_work_on_a_bake_is_kept_when_it_is_baked_again(rooms, body):
     press(bpy.ops.beyond_mocap.reduce_keys)
     actions = len(bpy.data.actions)
     press(bpy.ops.beyond_mocap.bake_to_rig)
-    assert len(bpy.data.actions) == actions and "by hand" not in settings.told
+    assert len(bpy.data.actions) == actions and "edited keys" not in settings.told
     own = rig.animation_data.action
     curve = next(iter(rooms["core.channels"].curves(own, rig.animation_data.action_slot).values()))
     curve.keyframe_points[7].co.y += 0.1
@@ -485,7 +485,7 @@ def test_wrong_choices_are_told_in_one_line(rooms, body, tmp_path):
     assert complaint(save, filepath=str(tmp_path / "nowhere" / "map.json"))
     bpy.ops.object.select_all(action="DESELECT")
     assert "selected" in complaint(bake_to_rig, targets="SELECTED")
-    assert "no ticked player" in complaint(bake_to_rig, targets="PLAYERS")
+    assert "no selected player" in complaint(bake_to_rig, targets="PLAYERS")
 
 
 def test_a_rig_without_legs_is_told(body):

@@ -81,7 +81,7 @@ def test_words_that_are_there_stay_until_told(library):
     bpy.ops.beyond_mocap.annotate_clip(path="jogging_2_9.bvh")
     bpy.ops.beyond_mocap.propose_words()
     before = (library / "jogging_2_9.txt").read_text()
-    with pytest.raises(RuntimeError, match="has other words for this clip already"):
+    with pytest.raises(RuntimeError, match="already has other labels for this clip"):
         bpy.ops.beyond_mocap.save_words()
     assert (library / "jogging_2_9.txt").read_text() == before
     bpy.ops.beyond_mocap.save_words(overwrite=True)
@@ -127,7 +127,7 @@ def test_nothing_chosen_or_something_else():
                      bpy.ops.beyond_mocap.remove_clip):
         with pytest.raises(RuntimeError, match="clip"):
             operator()
-    with pytest.raises(RuntimeError, match="No clip is listed"):
+    with pytest.raises(RuntimeError, match="No clips listed"):
         bpy.ops.beyond_mocap.annotate_clip()
 
 
