@@ -63,7 +63,7 @@ class Built:
     Attributes:
         setting: the library folder as the setting spells it.
         library: None where it could not be built.
-        trouble: the error in that case.
+        error: the error in that case.
         listing: its clips.
         files: the folder's files when it was read.
     """

@@ -126,7 +126,7 @@ def shirt_for(number: int) -> tuple[float, float, float]:
 
 
 def free_name(wanted: str, taken: set[str]) -> str:
-    """Return `wanted`, or the first of "wanted 2", "wanted 3" ... that is not taken."""
+    """Return `name_base`, or the first of "wanted 2", "wanted 3" ... that is not taken."""
     number, name = 1, wanted
     while name in taken:
         number += 1

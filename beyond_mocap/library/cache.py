@@ -167,7 +167,7 @@ def write_synthetic_clips(place: Path, made: Iterable[Clip], missing_only: bool 
 
     Args:
         place: the cache's folder.
-        made: the clips.
+        clips: the clips.
         missing_only: write only files that do not exist.
     """
     try:

@@ -24,10 +24,10 @@ class Clip:
         motion: at its own rate, metres, the floor (2nd percentile of its toe heights, ../shared/metrics.md) at height
             0.
         annotations: in frames of its own rate, sides swapped on the twin.
-        standing: (T, 2, 2) bool, left and right foot, heel and toe in contact with the ground.
-        recorded: number of recorded frames, where a synthetic landing and getting up follow (`library.landings`); None:
-            all.
-        mended: what the repair found and left; None for synthetic clips.
+        heel_toe_contacts: (T, 2, 2) bool, left and right foot, heel and toe in contact with the ground.
+        recorded_count: number of recorded frames, where a synthetic landing and getting up follow (`library.landings`);
+            None: all.
+        repair_figures: what the repair found and left; None for synthetic clips.
     """
 
     path: str

@@ -141,7 +141,7 @@ def describe_clips(clips, like: Frames | None = None) -> Frames:
 
     Args:
         clips: of one skeleton (`library.clip`).
-        like: frames whose components are used, so that features of both can be compared; None uses the clips' own.
+        reference: frames whose components are used, so that features of both can be compared; None uses the clips' own.
     Returns:
         The frames.
     """

@@ -27,7 +27,7 @@ class Key:
         clip: clip index.
         frame: in the clip's own rate.
         start, end: first and last frame of its annotated row (the entry and exit that it needs).
-        words: labels that the frame carries.
+        labels: labels that the frame carries.
     """
 
     clip: int
@@ -112,7 +112,7 @@ def standing_in(choices: tuple[Key, ...], made: tuple[Key, ...], words) -> tuple
 
     Args:
         choices: recorded keys that answer to `words`.
-        made: synthetic keys.
+        synthetic: synthetic keys.
         words: requested labels.
     Returns:
         The substitutes.

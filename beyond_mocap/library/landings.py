@@ -29,9 +29,9 @@ class WayUp:
 
     Attributes:
         motion: T frames.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact.
-        words: its labels.
-        made: whether it is synthetic.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        labels: its labels.
+        is_synthetic: whether it is synthetic.
     """
 
     motion: Motion
@@ -47,8 +47,8 @@ class Completed:
     Attributes:
         motion: all frames.
         rows: its annotations.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact.
-        recorded: number of recorded frames.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        recorded_count: number of recorded frames.
     """
 
     motion: Motion
@@ -88,8 +88,8 @@ def completed(motion: Motion, rows, standing: np.ndarray, ways: Sequence[WayUp])
     Args:
         motion: T frames that end in flight.
         rows: its annotations.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact.
-        ways: movements of getting up; the best fitting one is used.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
+        getting_ups: movements of getting up; the best fitting one is used.
     Returns:
         The completed clip.
     """

@@ -34,8 +34,8 @@ class Gait:
     """A kind of locomotion in the library.
 
     Attributes:
-        word: its label.
-        words: all labels of its most common row.
+        label: its label.
+        labels: all labels of its most common row.
         speed: mean, m/s.
     """
 
@@ -56,8 +56,8 @@ class Library:
         clusters: by block length.
         fps: 30.
         notes: decisions made while building, for people.
-        kept: the cache's folder and key, for results that are computed later.
-        chosen: (gait label, clip path) pairs: the clip that defines a gait (`library.automatic_locomotion`).
+        cache_location: the cache's folder and key, for results that are computed later.
+        chosen_gaits: (gait label, clip path) pairs: the clip that defines a gait (`library.automatic_locomotion`).
     """
 
     folder: str
@@ -150,7 +150,7 @@ class Library:
 
         Args:
             speed: (T,) m/s of the track at the library's rate.
-            at_keys: (K,) m/s at its key moments.
+            key_speeds: (K,) m/s at its key moments.
             takes: (K,) bool, the key moment receives the ball.
         Returns:
             True if it does.

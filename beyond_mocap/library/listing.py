@@ -35,12 +35,12 @@ class Listed:
 
     Attributes:
         path: below the library's folder.
-        words: all labels that it carries, key moments' first.
-        moments: number of key moments.
+        labels: all labels that it carries, key moments' first.
+        key_moments: number of key moments.
         seconds: its length.
-        speed, fastest: m/s, mean and highest, NaN where not measured.
-        mark: GOOD, FAIR, POOR or UNKNOWN.
-        told: lines 'name: value' that explain the grade.
+        speed, max_speed: m/s, mean and highest, NaN where not measured.
+        grade: GOOD, FAIR, POOR or UNKNOWN.
+        details: lines 'name: value' that explain the grade.
     """
 
     path: str

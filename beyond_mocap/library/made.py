@@ -72,7 +72,7 @@ class Made:
         name: its path below the library's folder.
         motion: T frames.
         rows: its annotations.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact.
     """
 
     name: str
@@ -308,9 +308,9 @@ def _grounded(name: str, motion: Motion, standing: np.ndarray | None, rows, hold
     Args:
         name: of the clip.
         motion: T frames.
-        standing: (T, 2, 2) bool contacts; None detects them.
+        heel_toe_contacts: (T, 2, 2) bool contacts; None detects them.
         rows: its annotations.
-        hold: plant the feet.
+        plants_feet: plant the feet.
     Returns:
         The clip; points that still move are not in contact.
     """

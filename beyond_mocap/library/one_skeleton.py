@@ -36,8 +36,8 @@ def bring(
     Args:
         paths: the files.
         motions: as read, in the order of `paths`.
-        chosen: a recording with the library's skeleton (default: the skeleton with most frames, the first path's among
-            equals).
+        skeleton_example: a recording with the library's skeleton (default: the skeleton with most frames, the first
+            path's among equals).
         notes: gets one line about retargeted clips.
     Returns:
         For each clip the motion, its contacts (T, 2, 2) bool of heels and toes, and whether it came from another body.
@@ -139,7 +139,8 @@ def _commonest(motions: Sequence[Motion], groups: list[list[int]]) -> Skeleton:
 
 
 def _sample(motions: Sequence[Motion], standing: Sequence[np.ndarray]) -> tuple[Motion, np.ndarray]:
-    """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them."""
+    """Sample frames of all clips of one rig above one floor, and which feet (T, 2) are flat on the ground in them.
+    """
     ends = np.cumsum([len(motion) for motion in motions])
     frames = np.unique(np.linspace(0, ends[-1] - 1, _SAMPLE).astype(int))
     roots, rotations, feet = [], [], []

@@ -52,11 +52,11 @@ class Repaired:
 
     Attributes:
         motion: the repaired motion.
-        standing: (T, 2, 2) bool, left and right, heel and toe, on the ground.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe, on the ground.
         drift: metres between the lowest and the highest floor.
         travel: metres by which the last frame was moved relative to the first.
         slide: m/s before and after, mean over heels and toes in contact.
-        slid: whether the clip was sliding, so that travel and feet were corrected.
+        was_sliding: whether the clip was sliding, so that travel and feet were corrected.
     """
 
     motion: Motion
@@ -160,8 +160,8 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
     Args:
         motion: T frames.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact; None detects it.
-        plants: plant the feet also in clips that do not slide (a body that got other feet). Clips that slide
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact; None detects it.
+        always_plant: plant the feet also in clips that do not slide (a body that got other feet). Clips that slide
             (`is_sliding`) get planted feet and a corrected path anyway.
     Returns:
         The repaired clip.
@@ -180,21 +180,22 @@ def grounded(motion: Motion, standing: np.ndarray | None = None, plants: bool = 
 
 
 def slides(motion: Motion, standing: np.ndarray) -> bool:
-    """Whether feet in contact, by `standing` (T, 2, 2), slide faster than in good recordings of that speed."""
+    """Whether feet in contact, by `heel_toe_contacts` (T, 2, 2), slide faster than in good recordings of that speed."""
     way = np.linalg.norm(np.diff(motion.root_positions[:, :2], axis=0), axis=1)
     speed = way.mean() * motion.fps if len(way) else 0.0
     return _ball_slide(motion, standing) > np.hypot(_SLIDES, _SLIDES_SHARE * speed)
 
 
 def held(motion: Motion, standing: np.ndarray) -> Motion:
-    """Plant the feet where `standing` (T, 2, 2) marks heels and toes in contact, at their own heights."""
+    """Plant the feet where `heel_toe_contacts` (T, 2, 2) marks heels and toes in contact, at their own heights."""
     planted = plant(motion.skeleton, motion.root_positions, motion.rotations, standing=standing, fps=motion.fps,
                     sinks=_SINKS, levels=False)
     return replace(motion, root_positions=planted.root, rotations=planted.rotations)
 
 
 def slide(motion: Motion, standing: np.ndarray) -> float:
-    """Measure the mean horizontal speed in m/s of heels and toes in contact, `standing` (T, 2, 2); 0 without contact.
+    """Measure the mean horizontal speed in m/s of heels and toes in contact, `heel_toe_contacts` (T, 2, 2); 0 without
+    contact.
     """
     body = identify(motion.skeleton)
     places, _ = forward_kinematics(motion)
@@ -263,7 +264,7 @@ def _travelled(motion: Motion, standing: np.ndarray) -> tuple[Motion, float]:
 
 
 def _inner(stands: np.ndarray) -> np.ndarray:
-    """Weight stances (T, 2): 1 in the middle third of every stance and 0 in its outer sixths, from `stands` (T, 2)
+    """Weight stances (T, 2): 1 in the middle third of every stance and 0 in its outer sixths, from `contacts` (T, 2)
     bool.
     """
     weight = np.zeros(stands.shape)
@@ -278,7 +279,7 @@ def _smooth(pushed: np.ndarray, weight: np.ndarray, seconds: float, fps: float, 
     """Fit the curve f (T,) of least sum w (f - v)^2 + pull f^2 + stiffness |f''|^2.
 
     Args:
-        pushed: (T, P) w v.
+        weighted_values: (T, P) w v.
         weight: (T, P) w.
         seconds: how slowly f can change; the stiffness is its fourth power.
         fps: frames per second.

@@ -119,7 +119,8 @@ class Annotations:
     """The annotations of a library's clips, found as ../shared/contract.md describes under "Library annotations"."""
 
     def __init__(self, folder: Path, clips: list[Path], but: Callable[[Mapping], bool] | None = None):
-        """Read every table that may apply, without the rows that `but` selects (`read_annotation_csv`); InputError for
+        """Read every table that may apply, without the rows that `skips` selects (`read_annotation_csv`); InputError
+        for
         a broken
         one.
         """
@@ -157,7 +158,7 @@ class Conversions:
 
     Attributes:
         folder: the library's.
-        room: where conversions are stored.
+        converted_folder: where conversions are stored.
     """
 
     def __init__(self, folder: str | Path, place: str | Path):

@@ -79,7 +79,7 @@ class Foot:
         left: (T, 3) level unit vector across the foot.
         weight: (T, 2) contact weights of heel and toe, from 0 to 1.
         length: (T,) metres, thigh plus shank.
-        own: (T,) metres that the leg was short of that length in the given pose.
+        recorded_slack: (T,) metres that the leg was short of that length in the given pose.
     """
 
     limb: Limb
@@ -98,7 +98,7 @@ class Foot:
         return np.stack([np.diff(self.heel[:, :2], axis=0), np.diff(self.toe[:, :2], axis=0)], axis=1)
 
     def moved(self, by: np.ndarray) -> Foot:
-        """Return the foot moved by (T, 3) m."""
+        """Return the foot moved by `shift` (T, 3) m."""
         return replace(self, heel=self.heel + by, toe=self.toe + by)
 
     @property
@@ -131,14 +131,14 @@ def plant(
         skeleton: J joints.
         root: (T, 3) root positions of the constructed motion, metres, world.
         rotations: (T, J, 4) local rotations.
-        standing: (T, 2, 2) bool, left and right, heel and toe in contact with the ground.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe in contact with the ground.
         fps: frames per second.
-        sinks: metres by which the pelvis is lowered at most.
-        moves: (T, 2, 4) metres by which each foot is moved first, and radians that its heel is raised about its toe
-            (`synthesis.construct.steps`); None for none.
-        levels: bring feet in contact to the height of the ground and let none go below it. False keeps all heights: a
-            recording's own floor is uneven by centimetres, and pressing its feet onto z = 0 costs more jerk than it is
-            worth.
+        max_drop: metres by which the pelvis is lowered at most.
+        foot_moves: (T, 2, 4) metres by which each foot is moved first, and radians that its heel is raised about its
+            toe (`synthesis.construct.steps`); None for none.
+        level_feet: bring feet in contact to the height of the ground and let none go below it. False keeps all heights:
+            a recording's own floor is uneven by centimetres, and pressing its feet onto z = 0 costs more jerk than it
+            is worth.
     Returns:
         The planted motion with what it took.
     Raises:
@@ -182,7 +182,7 @@ def laid_foot(places: np.ndarray, world: np.ndarray, limb: Limb, stands: np.ndar
         places: (T, J, 3) joint positions, metres, world.
         world: (T, J, 4) world rotations.
         limb: the joints of its side.
-        stands: (T, 2) bool, heel and toe in contact.
+        contacts: (T, 2) bool, heel and toe in contact.
     Returns:
         The foot.
     """
@@ -241,14 +241,14 @@ def heel_rise(foot: Foot, moved: np.ndarray) -> np.ndarray:
 
     Args:
         foot: the foot before its shift.
-        moved: (T, 3) metres by which the foot is shifted.
+        shift: (T, 3) metres by which the foot is shifted.
     Returns:
         (T,) radians, at most MAX_HEEL_RISE.
     """
     u, a, n = foot.hip - foot.toe - moved, foot.heel - foot.toe, foot.left
     across = np.sum(a * n, axis=1, keepdims=True)
     level = a - across * n
-    # even, odd and asked are A, B and K of the docstring; `level` is the part of a that rotates
+    # even, odd and target are A, B and K of the docstring; `level` is the part of a that rotates
     even, odd = np.sum(u * level, axis=1), np.sum(u * cross(n, level), axis=1)
     length = foot.longest
     asked = 0.5 * (np.sum(u * u, axis=1) + np.sum(a * a, axis=1) - length**2) - across[:, 0] * np.sum(u * n, axis=1)
@@ -268,7 +268,7 @@ def held_shift(
         velocity: (T - 1, 2, 2) metres per frame of heel and toe.
         weight: (T, 2) contact weights.
         scale: 30 over the rate.
-        most: metres of shift above which a stance is relaxed.
+        max_shift: metres of shift above which a stance is relaxed.
     Returns:
         The shift (T, 2) in metres, and the weights (T, 2) with which it was found.
     """
@@ -303,7 +303,7 @@ def shift(velocity: np.ndarray, weight: np.ndarray, scale: float = 1.0, kept: np
         velocity: (T - 1, P, K) movement per frame of P points, or (T - 1, K) of one point.
         weight: (T, P) contact weight of each point.
         scale: 30 over the rate, which keeps the balance at other rates.
-        kept: (T, K) given shifts, rows of NaN where D is free.
+        fixed_shifts: (T, K) given shifts, rows of NaN where D is free.
     Returns:
         (T, K), in the unit of the velocity.
     """
@@ -354,7 +354,7 @@ def lift_to_ground(foot: Foot, sole: float, scale: float) -> np.ndarray:
 
 
 def settled(right: np.ndarray, weight: np.ndarray, scale: float, smooth: float = SMOOTH) -> np.ndarray:
-    """Fit the smooth curve (T,) that is `right` / `weight` where the weight is large, and small elsewhere."""
+    """Fit the smooth curve (T,) that is `weighted_values` / `weight` where the weight is large, and small elsewhere."""
     squares = BandedLeastSquares(len(weight))
     squares.add_difference(3, smooth / scale**6)
     squares.add_value(weight + 2e-2)

@@ -168,7 +168,7 @@ def bent_limb(
         places: (T, J, 3) joint positions, metres, world; those of the limb at least.
         world: (T, J, 4) world rotations; those of the limb at least.
         joints, target, end_rotation, keep_end_rotation, pole, soft: as for `solve_two_bone`.
-        clear: one value or (T,), share of the limb's length by which a knee has to be off the line hip-ankle for its
+        min_bend: one value or (T,), share of the limb's length by which a knee has to be off the line hip-ankle for its
             direction to be trusted.
     Returns:
         The new local rotations (T, 4) by joint, and the miss (T,) in metres.

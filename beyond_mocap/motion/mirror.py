@@ -123,9 +123,9 @@ def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
     In the mirrored body a local rotation is C_parent^-1 L_p C_j, which should look like L_j on average.
 
     Args:
-        usual: (D, 3, 3) candidate reflections.
+        candidates: (D, 3, 3) candidate reflections.
         pair: offsets (B, 3) of the joint's bones and of its partner's, metres.
-        before: (3, 3) the parent's D; None at the root, whose rotation has no parent to be compared with.
+        parent_reflection: (3, 3) the parent's D; None at the root, whose rotation has no parent to be compared with.
         mean: (3, 3) mean local rotation matrix of the joint.
         partner_mean: (3, 3) the same of its partner.
     Returns:
@@ -142,7 +142,8 @@ def _choose(usual, pair, before, mean, partner_mean) -> np.ndarray:
 
 
 def _procrustes(bones: np.ndarray, images: np.ndarray, pull: np.ndarray) -> np.ndarray:
-    """Fit the orthogonal matrix of determinant -1 that carries bones (B, 3) to images (B, 3); `pull` decides the rest.
+    """Fit the orthogonal matrix of determinant -1 that carries bones (B, 3) to images (B, 3); `preferred` decides the
+    rest.
     """
     # the same scale for a joint and its partner, so that their matrices are inverse to each other
     scale = np.sqrt(np.sum(bones**2) * np.sum(images**2)) or 1.0

@@ -33,8 +33,8 @@ class Strides:
     Attributes:
         motion: T frames.
         landings: (K,) fractional frames at which the feet land in turn.
-        first: side of the first landing, 0 left, 1 right.
-        standing: (T, 2, 2) bool, left and right, heel and toe on the ground.
+        first_side: side of the first landing, 0 left, 1 right.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe on the ground.
         facing: (T,) heading, radians, unwrapped.
         path: (T, 2) metres, the pelvis's path over the ground without its sway.
     """
@@ -77,7 +77,7 @@ def strides(motion: Motion, standing: np.ndarray) -> Strides | None:
 
     Args:
         motion: T frames of locomotion.
-        standing: (T, 2, 2) bool, left and right, heel and toe on the ground.
+        heel_toe_contacts: (T, 2, 2) bool, left and right, heel and toe on the ground.
     Returns:
         The stretch, or None if it has fewer than two steps.
     """

@@ -228,7 +228,7 @@ def continuous(q: np.ndarray) -> np.ndarray:
 
 
 def signed_like(q: np.ndarray, like: np.ndarray) -> np.ndarray:
-    """Choose the signs of rotations (..., 4) that are nearer to the reference `like` (..., 4)."""
+    """Choose the signs of rotations (..., 4) that are nearer to `reference` (..., 4)."""
     return np.where(np.sum(q * like, axis=-1, keepdims=True) < 0.0, -q, q)
 
 

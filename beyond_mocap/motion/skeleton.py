@@ -91,7 +91,7 @@ class Skeleton:
         return Skeleton(tuple(self.names[joint] for joint in kept), tuple(parents), self.offsets[kept]), kept
 
     def scaled(self, size: float) -> "Skeleton":
-        """Return the skeleton of a body `size` times as large."""
+        """Return the skeleton of a body `factor` times as large."""
         return replace(self, offsets=self.offsets * size, end_offsets=self.end_offsets * size)
 
     def same_bones(self, other: "Skeleton", tolerance: float = 1e-3) -> bool:

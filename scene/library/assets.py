@@ -37,9 +37,9 @@ class Draft:
     Attributes:
         name: of the asset.
         motion: its frames.
-        words: its labels, used as tags.
+        labels: its labels, used as tags.
         frame: the pose that its picture shows.
-        told: description of the asset.
+        description: description of the asset.
         action: name of the action that plays it already, "" to create one.
     """
 
@@ -95,7 +95,7 @@ def make(context: bpy.types.Context, drafts: list[Draft], pictures: list,
         context: of Blender.
         drafts: the motions.
         pictures: (H, W, 4) arrays or None.
-        apart: leave own actions as they are, and mark copies of them.
+        copy_actions: leave own actions as they are, and mark copies of them.
     Returns:
         The actions.
     """

@@ -68,7 +68,7 @@ class Queue:
     """The recordings of a library that need a conversion, one at a time, so that a window stays responsive.
 
     Attributes:
-        todo: those that remain.
+        remaining: those that remain.
         total: number at the start.
         notes: results, one line for each that needs attention.
     """

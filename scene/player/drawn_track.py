@@ -35,7 +35,7 @@ class Line:
 
     Attributes:
         line: (N, 3) metres, world.
-        at: (P,) index into it of each control point.
+        point_indices: (P,) index into it of each control point.
         speeds: (P,) m/s.
         waits: (P,) seconds.
     """

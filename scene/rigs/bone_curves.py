@@ -183,9 +183,9 @@ def root_motion(rig: bpy.types.Object, shown, wanted, told: list[str]):
 
     Args:
         rig: the armature.
-        shown: its sampled poses (`export`).
-        wanted: the export's options.
-        told: gets messages.
+        sampled: its sampled poses (`export`).
+        options: the export's options.
+        messages: gets messages.
     Returns:
         Hips, root bone (None: it has none), the root's path (F, 4, 4) and the matrices (F, 4, 4) that keep the body in
         place; the last two are None where they are not requested.

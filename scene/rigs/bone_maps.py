@@ -73,7 +73,7 @@ def _parts(skeleton: Skeleton, body: Humanoid) -> dict[str, int]:
 
 
 def _thinned(joints, most: int) -> list[int]:
-    """Thin joints to at most `most`, with the first and last."""
+    """Thin joints to at most `max_count`, with the first and last."""
     joints = list(joints)
     if len(joints) <= most:
         return joints

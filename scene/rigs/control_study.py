@@ -50,7 +50,7 @@ class PosedRig:
         """Pose the controls, and read bones as Blender then poses them.
 
         Args:
-            turns: (n, 4) the controls' own rotations.
+            rotations: (n, 4) the controls' own rotations.
             bones: W names to read.
             places: (n, 3) the controls' locations; None for rest.
         Returns:
@@ -125,9 +125,10 @@ class Rides:
     Attributes:
         controls: their names.
         carriers: names of possible carriers.
-        turn_of, place_of: (n,) index into `carriers` of the bone that carries rotation and position, STATIC for none.
-        parent_of: (n,) the rotation's carrier of the bone above.
-        firm: (n,) bool, the control's channels move it and one bone carries it.
+        rotation_carrier, position_carrier: (n,) index into `carriers` of the bone that carries rotation and position,
+            STATIC for none.
+        parent_carrier: (n,) the rotation's carrier of the bone above.
+        is_reliable: (n,) bool, the control's channels move it and one bone carries it.
     """
 
     controls: list[str]

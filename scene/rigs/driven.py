@@ -189,8 +189,8 @@ def list_followers(
 
     Args:
         rig: the armature.
-        controls, shown: part -> the bone that moves it, that displays it.
-        near: armature units within which a helper bone rests at a part.
+        controls, display_bones: part -> the bone that moves it, that displays it.
+        tolerance: armature units within which a helper bone rests at a part.
     Returns:
         Bone -> part.
     """

@@ -72,7 +72,7 @@ def write(
     Args:
         context: of Blender.
         rigs: armatures that move.
-        wanted: the options.
+        options: the options.
         things: meshes that no rig moves, such as a ball and a pitch, which are exported beside them (not as BVH).
     Returns:
         Messages for the user.

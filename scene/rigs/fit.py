@@ -33,7 +33,7 @@ class BakeOptions:
         root: one of `rig.ROOTS`.
         keeps_travel: footprints stay where they are (None: where the legs are similar).
         bakes_ik: IK targets follow instead of being switched off.
-        plants: plant the feet again.
+        plants_feet: plant the feet again.
         exact: the motion is on the driven skeleton already and is used unchanged.
     """
 
@@ -146,7 +146,7 @@ def _stand_spread(motion: Motion, points: np.ndarray) -> float:
 
 
 def slide(motion: Motion, standing: np.ndarray) -> Slide:
-    """Measure how far the feet of a motion slide while in contact, `standing` (T, 2) bool."""
+    """Measure how far the feet of a motion slide while in contact, `foot_contacts` (T, 2) bool."""
     from ...beyond_mocap.synthesis.quality import movement
 
     joints = movement.foot_joints(motion.skeleton)
@@ -169,7 +169,7 @@ class Source:
         motion: F frames.
         start: scene frame of the first.
         name: of the action or strip.
-        standing: (F, 2) bool, feet in contact as stored in the take; None where only the motion shows it.
+        foot_contacts: (F, 2) bool, feet in contact as stored in the take; None where only the motion shows it.
     """
 
     motion: Motion
@@ -184,7 +184,7 @@ def source_of(body: bpy.types.Object | None, scene: bpy.types.Scene, standing=No
     Args:
         body: the armature.
         scene: of the armature.
-        standing: function (frames) -> (F, 2) bool of a take; None where there is none.
+        find_contacts: function (frames) -> (F, 2) bool of a take; None where there is none.
     Returns:
         The motion.
     Raises:

@@ -34,7 +34,7 @@ def reduce(
         table: part -> bone.
         scene: of the rig.
         tolerance: metres that hands, feet, head and moved bones may be off.
-        turn_tolerance: radians that a bone may be off.
+        rotation_tolerance: radians that a bone may be off.
     Returns:
         The numbers of keys before and after.
     Raises:
@@ -180,7 +180,7 @@ def _levers(driven: Driven) -> dict[str, float]:
 
 
 def _rekey(curve: bpy.types.FCurve, frames: np.ndarray, values: np.ndarray, kept: np.ndarray) -> None:
-    """Replace a curve's keys by those on `kept`, joined by cubics with the slopes of the dense values."""
+    """Replace a curve's keys by those on `key_frames`, joined by cubics with the slopes of the dense values."""
     slopes = np.gradient(values) if len(values) > 1 else np.zeros_like(values)
     at, value, slope = frames[kept].astype(float), values[kept], slopes[kept]
     after = np.diff(at, append=at[-1] + 1.0) / 3.0

@@ -51,7 +51,7 @@ class BeyondMocapRigBone(bpy.types.PropertyGroup):
 
 def fill(settings: "BeyondMocapRig", again: bool = False) -> str:
     """Map the bones of the chosen rig: the map stored for its skeleton, else by names and structure (always, if
-    `again`).
+    `ignores_stored`).
 
     Returns:
         Where the map came from, as text.

@@ -38,7 +38,7 @@ class Baked:
         frames: (F,) scene frames.
         scale: legs of the rig relative to the source's.
         slides: of the source, of the rig before and after planting.
-        told: messages for the user.
+        messages: messages for the user.
     """
 
     action: bpy.types.Action
@@ -59,7 +59,7 @@ class Fitted:
         frames: (F,) scene frames.
         curves: as for `channels.create_action`.
         heads: (F, B, 3) of the driven bones, armature space.
-        told: messages for the user.
+        messages: messages for the user.
     """
 
     name: str

@@ -54,8 +54,8 @@ class Act:
         moment: whether it has key moments, else it is a stretch.
         kernel: similarity of windows to the act.
         weights: (3,) of its confidence (`kernel.compute_confidence`).
-        silent: the value that replaces the rules' confidence where they propose nothing.
-        shown: number of moments, or seconds, that it was learned from.
+        silence: the value that replaces the rules' confidence where they propose nothing.
+        example_amount: number of moments, or seconds, that it was learned from.
         strike: index of STRIKES whose peak gives the key frame, -1 for the score's own peak.
         lead: seconds from that peak to the key.
         before, after: seconds of a row around its key.

@@ -31,7 +31,7 @@ class Details:
     Attributes:
         choices: for each group its labels, "" for none of them.
         planes: for each group (C, K + 1), scores of its C choices from a window's K components and 1.
-        by_rule: for each group, whether the rules have priority.
+        rules_first: for each group, whether the rules have priority.
     """
 
     choices: tuple[tuple[str, ...], ...]

@@ -28,7 +28,7 @@ class Example:
         name: for messages, and to keep clips apart.
         signals: of its motion.
         rows: all its annotations.
-        ruled: what the rules propose for it.
+        rule_proposals: what the rules propose for it.
     """
 
     name: str
@@ -70,7 +70,7 @@ def examples_of(
         progress: called with a fraction and a text.
         cache_dir: of the library.
         cancelled: called often; True stops the work.
-        note: called with a text about skipped rows.
+        on_note: called with a text about skipped rows.
     Returns:
         The examples.
     Raises:
@@ -100,7 +100,7 @@ class _Clips:
     """A library's recordings and their annotations.
 
     Attributes:
-        open: number of rows of tables that are proposals only.
+        unreviewed_count: number of rows of tables that are proposals only.
     """
 
     def __init__(self, folder: str | Path, cache_dir):

@@ -87,7 +87,7 @@ def weigh_silence(found: int, shown: int) -> float:
 
     Args:
         found: examples that the rules have found.
-        shown: number of examples.
+        total: number of examples.
     Returns:
         The weight, at most 1.
     """
@@ -101,7 +101,7 @@ def fit_confidence(score: np.ndarray, rule: np.ndarray, is_act: np.ndarray, rule
         score: (N,).
         rule: (N,) confidence of the rules.
         is_act: (N,) bool.
-        ruled: whether the rules know the act.
+        has_rules: whether the rules know the act.
     Returns:
         (3,) weights of score, rule and 1.
     Source: Platt 1999.

@@ -38,9 +38,9 @@ class _Side:
         example: the clip.
         rows: (N, K) its windows.
         seconds: (N,) of the samples.
-        said: its rows' labels in the order of `example.rows`.
-        ruled: what the rules propose, in seconds.
-        twin: whether it is mirrored.
+        labels: its rows' labels in the order of `example.rows`.
+        rule_proposals: what the rules propose, in seconds.
+        is_mirrored: whether it is mirrored.
     """
 
     example: Example

@@ -114,7 +114,7 @@ def _value(powers: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _solved(powers: np.ndarray, speeds: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Solve x (N,) in [-1, 1] at which rising polynomials (K, N) reach `wanted` (N,): Newton's method, else bisection.
+    """Solve x (N,) in [-1, 1] at which rising polynomials (K, N) reach `targets` (N,): Newton's method, else bisection.
     """
     low, high = np.full(len(wanted), -1.0), np.ones(len(wanted))
     whole = powers.sum(axis=0)

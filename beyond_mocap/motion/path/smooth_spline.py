@@ -47,7 +47,7 @@ def smoothing_spline(
         order: 2 or 3.
         weights: (N,), else 1.
         closed: the end joins the start (`domain` is then one round, `pieces` at least 8).
-        ends_met: keep the first and last value exactly.
+        keep_ends: keep the first and last value exactly.
         domain: first and last parameter, else of `at`.
     Returns:
         Knots (P + 4,) and coefficients (P, K).
@@ -115,7 +115,7 @@ def ground_path(places: np.ndarray, facing: np.ndarray, fps: float, way: str = "
         places: (T, 2) metres, the pelvis on the ground.
         facing: (T,) radians, unwrapped.
         fps: frames per second.
-        way: "smooth" or "straight".
+        kind: "smooth" or "straight".
     Returns:
         The path (T, 2) in metres and its heading (T,) in radians.
     """

@@ -49,8 +49,8 @@ class Anatomy:
         skeleton: J joints.
         body: the joints by meaning.
         axes: (J, 4) F_j as quaternions, for the joints in `known_joints`; the identity for others.
-        known: joints with an anatomical frame.
-        still: (J, 4) mean local rotations, for joints without a meaning.
+        known_joints: joints with an anatomical frame.
+        mean_rotations: (J, 4) mean local rotations, for joints without a meaning.
         leg: thigh plus shank, metres.
         ankle: its height above the ground when the foot is flat, metres.
         ball: the toe joint's height then, metres.
@@ -94,7 +94,8 @@ def study(
         skeleton: J joints.
         body: their meaning.
         example: a recording on the skeleton (its bones' lengths are not used); None uses the rest pose.
-        standing: (T, 2) bool, feet of the example in contact; without it feet count as in contact where they are low.
+        foot_contacts: (T, 2) bool, feet of the example in contact; without it feet count as in contact where they are
+            low.
     Returns:
         The anatomy.
     """

@@ -207,7 +207,7 @@ def _angle(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None,
 
 
 def _point(skeleton: Skeleton, world: np.ndarray, joint: int, child: int | None, wanted: np.ndarray) -> None:
-    """Rotate `joint` and all below it so that its bone points along `wanted`; a half turn is about the body's X."""
+    """Rotate `joint` and all below it so that its bone points along `target`; a half turn is about the body's X."""
     direction = _direction(skeleton, world, joint, child)
     turn = quaternion.between(direction, wanted)
     if np.dot(direction, wanted) < -0.999:

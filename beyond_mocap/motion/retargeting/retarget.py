@@ -278,7 +278,7 @@ def _mid_hips(places: np.ndarray, anatomy: Anatomy) -> np.ndarray:
 
 
 def _between(shares: Sequence[float] | np.ndarray, turns: list[np.ndarray], share: float) -> np.ndarray:
-    """Interpolate the rotation (T, 4) at `share` among `turns` that are known at rising `shares`."""
+    """Interpolate the rotation (T, 4) at `share` among `rotations` that are known at rising `shares`."""
     high = min(int(np.searchsorted(shares, share - 1e-9)), len(shares) - 1)
     low = max(high - 1, 0)
     width = shares[high] - shares[low]
@@ -304,7 +304,7 @@ class Pairs:
     Attributes:
         source, target: the joints by meaning.
         others: target joint -> source joint for joints without a meaning (fingers, twist bones).
-        tops: the joints of source and target that end the trunk at the same part; None where there are none.
+        trunk_tops: the joints of source and target that end the trunk at the same part; None where there are none.
     """
 
     source: Humanoid

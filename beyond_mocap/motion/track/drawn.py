@@ -100,7 +100,7 @@ def nurbs_line(
         weights: (P,).
         order: degree plus one.
         clamped: whether it starts and ends in its first and last point.
-        fine: pieces for each control point except one.
+        pieces_per_point: pieces for each control point except one.
     Returns:
         The line (N, 3), and (P,) the sample where each control point has most influence: at the mean of its knots.
     """

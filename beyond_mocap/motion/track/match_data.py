@@ -56,7 +56,7 @@ class Half:
 
     Attributes:
         number: 1 for the first half, 3 and 4 in extra time.
-        zero: second of the match at which this clock is at 0, before `start` where the file begins later.
+        clock_zero: second of the match at which this clock is at 0, before `start` where the file begins later.
         start, end: its frames, seconds.
     """
 
@@ -83,7 +83,7 @@ class Match:
         notes: assumptions, for people.
         teams: home, away, and referees where there are any.
         report: the data report, a line each: assumptions, corrections, and how long each player is present.
-        passed: for each period its number and the seconds on its clock at its first frame; () where the numbers are
+        elapsed: for each period its number and the seconds on its clock at its first frame; () where the numbers are
             1, 2, ... and the clocks start at 0.
     """
 
