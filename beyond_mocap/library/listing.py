@@ -125,7 +125,7 @@ def _quality(clip: Clip, speed: float, jerk: float) -> tuple[int, tuple[str, ...
         slid = f" (file: {100 * mended.slid:.0f})" if mended.slid > mended.slides + 0.01 else ""
         told.append(f"feet slide: {100 * mended.slides:.0f} cm/s{slid}")
         if mended.drift > 0.0:
-            told.append(f"floor drift removed: {100 * mended.drift:.0f} cm")
+            told.append(f"floor levelled: {100 * mended.drift:.0f} cm")
         if mended.pops:
             told.append(f"jumps removed: {mended.pops}")
     told.append(f"jerk: {jerk:.1f} x usual")

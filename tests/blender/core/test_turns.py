@@ -141,7 +141,8 @@ def test_changed_meanwhile_is_made_again(hand, ready, session):  # noqa: F811
     hand.run(button, until=lambda: button.job is not None)
     ready.alpha = 0.4
     assert hand.run(button) == {"FINISHED"}
-    assert [round(order.plan.alpha, 3) for order in hand.made] == [0.2, 0.4] and "generated again" in " ".join(hand.told)
+    assert [round(order.plan.alpha, 3) for order in hand.made] == [0.2, 0.4]
+    assert "generated again" in " ".join(hand.told)
     assert session.made(ready.players[0].take).plan.alpha == pytest.approx(0.4)
 
 
