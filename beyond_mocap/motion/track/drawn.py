@@ -130,7 +130,7 @@ def _check(line: np.ndarray, arc: np.ndarray, speeds: np.ndarray, name: str) -> 
         raise InputError(name, f"{speeds.max():.1f} m/s", f"{FASTEST:g} m/s at most", "lower the speed of that point")
     stops = np.flatnonzero((speeds[:-1] == 0.0) & (speeds[1:] == 0.0))
     if len(stops):
-        found = f"speed 0 at both points {stops[0] + 1} and {stops[0] + 2}, no player gets from one to the other"
+        found = f"speed 0 at both points {stops[0] + 1} and {stops[0] + 2}: no player gets from one to the other"
         raise InputError(name, found, "a speed at one of them", "set the speed of the points")
     if np.any(np.diff(arc) <= 0.0):
         raise InputError(name, "two points at the same position", "points apart from each other", "delete one of them")

@@ -43,7 +43,7 @@ def test_a_folder_is_listed_without_being_built(listed):
     assert shown(listed) == ["kicks/low.bvh", "other.bvh", "walk.bvh"]
     low, other, walk = listed.shown
     assert low.name == "low" and low.words.split()[0] == "kick" and set(low.words.split()) == {"kick", "right", "low"}
-    assert "1 moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
+    assert "1 key moment" in low.figures and low.figures.startswith("2.0 s") and walk.seconds == pytest.approx(3.0)
     assert other.words == "" and [clip.mark for clip in listed.shown] == [3, 3, 3]
 
 
@@ -142,7 +142,7 @@ def test_news_tell_what_is_new_changed_and_gone(folder, rooms, core):
         core("files.bvh.bvh").write(folder / f"{name}.bvh", made.motion(core, 20))
     (folder / "walk.txt").write_text("0 2.5 walking front\n")
     (folder / "kicks/low.bvh").unlink()
-    assert news(before, look(str(folder))) == "3 new clips, 1 gone clip, 1 changed words file"
+    assert news(before, look(str(folder))) == "3 new clips, 1 removed clip, 1 changed label file"
     assert look(str(folder / "nowhere")) is None
 
 

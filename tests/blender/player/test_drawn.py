@@ -78,9 +78,9 @@ def test_set_speed_sets_the_chosen_points_in_one_step(scene, drawn):
 def test_what_cannot_be_gone_along_is_told(scene, drawn, core):
     trouble = core("base.errors").InputError
     for points, speeds, change, part in (
-        (LINE[:1], None, None, "no line"),
+        (LINE[:1], None, None, "fewer than two points"),
         ([(0, 0, 0), (0.1, 0, 0)], None, None, "0.10 m long"),
-        (LINE, [0.0, 0.0, 1.0], None, "speed 0 at points 1 and 2"),
+        (LINE, [0.0, 0.0, 1.0], None, "speed 0 at both points 1 and 2"),
         (LINE, [1.0, 13.0, 1.0], None, "13.0 m/s"),
         (LINE, None, "use_cyclic_u", "a closed curve"),
     ):
