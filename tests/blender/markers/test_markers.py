@@ -404,7 +404,7 @@ def test_the_motion_goes_to_the_library_with_its_words(walk, session, tmp_path):
     settings.add, settings.words = True, "walking"
     bpy.ops.beyond_mocap.reconstruct_markers()
     assert (tmp_path / "walk.bvh").is_file() and "walking" in (tmp_path / "walk.txt").read_text()
-    with pytest.raises(RuntimeError, match="is there already"):
+    with pytest.raises(RuntimeError, match="already exists"):
         bpy.ops.beyond_mocap.reconstruct_markers()
 
 

@@ -65,7 +65,7 @@ def test_a_match_is_read_into_the_list(place):
     rows = [(player.name, player.number, player.team, player.use) for player in match.players]
     assert rows[0] == ("Ada Keeper", 1, "home", True) and rows[-1] == ("Ivo Fresh", 14, "away", True)
     assert len(rows) == 9 and (match.start, match.end) == (0.0, 24.0)
-    assert "away_9: there for 9 s (0.0-9.0 s)" in match.report
+    assert "away_9: present for 9 s (0.0-9.0 s)" in match.report
     assert match.read_of.endswith("small.dat")
 
 

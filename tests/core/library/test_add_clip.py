@@ -31,7 +31,7 @@ def test_nothing_is_replaced(tmp_path, walk):
     with pytest.raises(InputError, match="already"):
         add_clip(tmp_path, "walk", walk)
     (tmp_path / "run.txt").write_text("0 1 running\n")
-    with pytest.raises(InputError, match="words already"):
+    with pytest.raises(InputError, match="already has labels"):
         add_clip(tmp_path, "run", walk, ["walking"])
     assert not (tmp_path / "run.bvh").exists()
 

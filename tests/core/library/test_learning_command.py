@@ -60,19 +60,19 @@ def test_proposals_are_no_examples_until_they_are_accepted(folder, tmp_path, cap
     shutil.copytree(folder, home)
     table = home / "annotations.csv"
     head = "file,fps,start_frame,end_frame,key_frame,labels,confidence,source,why"
-    learned = "new/one.bvh,120,125,185,156,kick right low,0.9,learned,looks like it"
+    learned = "new/one.bvh,120,125,185,156,kick right low,0.9,learned,similar to the examples"
     ruled = "new/two.bvh,120,0,60,,walking,0.8,rules,1.2 m/s"
     table.write_text(f"{head}\n{learned}\n{ruled}\n")
     assert main(["library", str(home), "--learn", out]) == 0
     told = capsys.readouterr()
     assert "learned from 4 clips" in told.out and "kick: 3 moments" in told.out
     (line,) = [line for line in told.err.splitlines() if line.startswith("note: ")]
-    assert "2 proposed rows are no example" in line
-    table.write_text(f"{head}\n{learned.removesuffix('looks like it')}\n{ruled}\n")
+    assert "2 proposed rows are not used until" in line
+    table.write_text(f"{head}\n{learned.removesuffix('similar to the examples')}\n{ruled}\n")
     assert main(["library", str(home), "--learn", out]) == 0
     told = capsys.readouterr()
     assert "learned from 5 clips" in told.out and "kick: 4 moments" in told.out
-    assert "1 proposed row is no example" in told.err
+    assert "1 proposed row is not used until" in told.err
 
 
 def test_a_library_of_proposals_alone_has_nothing_to_learn_from(folder, tmp_path, capsys):
@@ -82,7 +82,7 @@ def test_a_library_of_proposals_alone_has_nothing_to_learn_from(folder, tmp_path
     table.write_text(table.read_text().replace("new/", ""))
     assert main(["library", str(table.parent), "--learn", str(tmp_path / "m.npz")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "no clip with words" in line and "nobody has accepted" in line
+    assert "no clip with labels" in line and "until you accept" in line
 
 
 def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
@@ -126,4 +126,4 @@ def test_a_recording_without_legs_is_named(tmp_path, capsys, option):
 
 def test_a_library_without_words_has_nothing_to_learn_from(folder, tmp_path, capsys):
     assert main(["library", str(folder / "new"), "--learn", str(tmp_path / "m.npz")]) == 2
-    assert "no clip with words" in capsys.readouterr().err
+    assert "no clip with labels" in capsys.readouterr().err

@@ -169,7 +169,7 @@ def test_a_motion_is_added_to_a_library_with_its_words(run, place, tmp_path, mad
     assert status == 2 and "already" in error[0]
     (clips / "walk.bvh").unlink()
     status, _, error = run(place / "walk.trc", "--static", place / "static.trc", "--out", tmp_path / "p.bvh", *words)
-    assert status == 2 and "words already" in error[0] and not (tmp_path / "p.bvh").exists()
+    assert status == 2 and "already has labels" in error[0] and not (tmp_path / "p.bvh").exists()
 
 
 def test_how_a_ball_lies_in_the_hand_may_be_known():
