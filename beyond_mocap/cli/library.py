@@ -113,7 +113,7 @@ def add_learning_options(verb) -> None:
     """
     verb.add_argument("--learn", type=Path, metavar="MODEL.npz", help="learn from the clips that have labels")
     verb.add_argument("--propose", type=Path, metavar="OUT.csv", help="propose labels for the clips without any")
-    verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="a learned model; without it only rules propose")
+    verb.add_argument("--learned", type=Path, metavar="MODEL.npz", help="a learned model; without it rules alone")
     add_options(verb, "library.learn")
 
 
