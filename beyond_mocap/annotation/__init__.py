@@ -1,4 +1,4 @@
-"""Annotations: labels with a time. Vocabulary, timeline, text form, gaits by speed.
+"""Labels with a time: vocabulary, timeline, text form, gaits by speed.
 
 - `labels`        what each label means, from one table (`vocabulary.csv`)
 - `ball_contact`  what labels say about the ball: which body part meets it, and when

@@ -1,4 +1,4 @@
-"""Rating studies: how natural motions look to people (Faustino §5.1).
+"""Rating studies of how natural motions look (Faustino §5.1).
 
 - `order`     clips under neutral names, each rater's order, and study.json
 - `form`      the questions and the page that a rater fills in, which needs no network
