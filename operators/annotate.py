@@ -281,7 +281,7 @@ class BEYOND_MOCAP_OT_load_video(Verb, ImportHelper, bpy.types.Operator):
     def do(self, context):
         """Load and drive the video, then open an editor for it."""
         if not self.filepath:
-            raise InputError("video", "no file", "a movie, or the first picture of a sequence", "choose a file")
+            raise InputError("video", "no file given", "a movie, or the first picture of a sequence", "choose a file")
         clip, scene = video.load(bpy.path.abspath(self.filepath)), context.scene
         video.show(scene, clip, self.rate or None)
         if self.show:

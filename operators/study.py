@@ -47,7 +47,7 @@ class BEYOND_MOCAP_OT_study_render(Verb, bpy.types.Operator):
     def do(self, context):
         """Read all clips, then render those that are missing."""
         if not self.directory:
-            raise InputError("study", "no folder", "the folder with study.json", "choose the folder")
+            raise InputError("study", "no folder given", "the folder with study.json", "choose the folder")
         folder = Path(bpy.path.abspath(self.directory))
         study = read_study(folder)
         out = folder / CLIPS
@@ -95,7 +95,7 @@ def _read(folder: Path, clip):
     path = folder / clip.file
     if path.suffix.lower() in MOVIES:
         if not path.is_file():
-            raise InputError(path, "does not exist", "a movie", "correct the table and create the study again")
+            raise InputError(path, "no such file", "a movie", "correct the table and create the study again")
         return path
     if path.suffix.lower() != ".bvh":
         raise InputError(path, f"file type {path.suffix}", f"a .bvh file or a movie ({', '.join(MOVIES)})",

@@ -86,7 +86,7 @@ class ImportVerb(Verb, ImportHelper):
         """Return the one chosen file; InputError if there are none or several."""
         chosen = self.chosen()
         if len(chosen) != 1:
-            raise InputError("import", f"{len(chosen)} files" if chosen else "no file", expected)
+            raise InputError("import", f"{len(chosen)} files" if chosen else "no file given", expected)
         return chosen[0]
 
 
@@ -122,7 +122,7 @@ class ExportVerb(Verb, ExportHelper):
     def out(self) -> Path:
         """Return the file to write; InputError if none is chosen."""
         if not self.filepath:
-            raise InputError("export", "no file", "a file to write", "choose a file")
+            raise InputError("export", "no file given", "a file to write", "choose a file")
         return export.with_ending(Path(bpy.path.abspath(self.filepath)), export.SUFFIXES[self.format])
 
 

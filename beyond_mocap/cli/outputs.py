@@ -172,7 +172,7 @@ def named_folder(text: str) -> Path:
         ArgumentTypeError: if the text is empty.
     """
     if not text.strip():
-        raise argparse.ArgumentTypeError("the folder has no name")
+        raise argparse.ArgumentTypeError("no folder is named")
     return Path(text)
 
 

@@ -78,7 +78,7 @@ def _check_folder(folder: Path) -> None:
         raise InputError(folder, "is a file", "a folder", "choose another name")
     place = folder if folder.is_dir() else folder.absolute().parent
     if not place.is_dir():
-        raise InputError(folder, "its parent folder does not exist", "an existing folder", "create that folder first")
+        raise InputError(folder, "the folder above it does not exist", "an existing folder", "create that folder first")
     if not os.access(place, os.W_OK | os.X_OK):
         raise InputError(folder, "is not writable", "a writable folder", "choose another folder")
 

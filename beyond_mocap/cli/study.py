@@ -107,7 +107,7 @@ def _copy(source: Path, target: Path) -> None:
     """Copy one movie under its neutral name, without its time stamps and original name."""
     source = source.resolve()
     if not source.is_file():
-        raise InputError(source, "does not exist", "a movie", "correct the table, or remove --copy")
+        raise InputError(source, "no such file", "a movie", "correct the table, or remove --copy")
     shutil.copyfile(source, target.with_suffix(source.suffix.lower()))
 
 

@@ -26,7 +26,7 @@ def opened(path: str | os.PathLike, kind: str, largest: int | None = None) -> Bi
         handle = open(path, "rb")
         size = os.fstat(handle.fileno()).st_size
     except FileNotFoundError:
-        raise InputError(path, "does not exist", kind, "check the path") from None
+        raise InputError(path, "no such file", kind, "check the path") from None
     except (OSError, ValueError) as error:
         raise _refused(path, kind, error) from None
     if largest is not None and size > largest:

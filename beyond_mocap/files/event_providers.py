@@ -88,7 +88,7 @@ def other_file(path: Path, provider: EventProvider, meta: str | os.PathLike | No
         return None
     if meta is not None:
         if not Path(meta).is_file():
-            raise InputError(meta, "does not exist", "lineups or metadata of the events", "check the path")
+            raise InputError(meta, "no such file", "lineups or metadata of the events", "check the path")
         return Path(meta)
     names = [re.sub(re.escape(ours), theirs, path.name, flags=re.IGNORECASE) for ours, theirs in provider.renamed]
     folders = [path.parent, path.parent.parent / "lineups"]

@@ -61,7 +61,7 @@ def read_events(
             match.
     """
     if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "does not exist"
+        found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a file of events", "check the path")
     path, name = Path(path), (provider or "").lower()
     if name and name not in EVENT_PROVIDERS:

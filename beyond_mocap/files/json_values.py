@@ -68,7 +68,7 @@ def check_names(value, where: str, known, needed) -> None:
     check_object(value, where)
     for name in needed:
         if name not in value:
-            raise InputError(where, f"{name!r} is missing", f"{', '.join(needed)}")
+            raise InputError(where, f"no {name!r}", f"{', '.join(needed)}")
     for name in value:
         if name not in known:
             raise InputError(where, shown(name), f"one of {', '.join(sorted(known))}", "check the spelling")

@@ -64,7 +64,7 @@ def load_tracking(feed: Feed, pitch: tuple[float, float]):
 
 def _check_file(path: str | os.PathLike) -> Path:
     if not Path(path).is_file():
-        found = "is a folder" if Path(path).is_dir() else "does not exist"
+        found = "is a folder" if Path(path).is_dir() else "no such file"
         raise InputError(path, found, "a tracking file", "check the path")
     return Path(path)
 

@@ -64,8 +64,8 @@ def test_labels_say_what_they_do_with_the_ball():
 
 @pytest.mark.parametrize(
     "row, found",
-    [("kick,kick,discrete,,,,,,,,,", "again"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
-     ("side_poke,side poke", "other cells")]
+    [("kick,kick,discrete,,,,,,,,,", "is repeated"), (SIDE_POKE.replace("sends", "shoots"), "ball 'shoots'"),
+     ("side_poke,side poke", "wrong columns")]
 )  # fmt: skip
 def test_a_wrong_row_is_reported_with_its_line(row, found, tmp_path, monkeypatch):
     table = tmp_path / "vocabulary.csv"

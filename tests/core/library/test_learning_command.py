@@ -93,7 +93,7 @@ def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
 
 @pytest.mark.parametrize("options, told", [
     (("--propose", "OUT/p.csv", "--learned", "OUT/none.npz"), "no such file"),
-    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "given beside --learn"),
+    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "set with --learn"),
     (("--propose", "OUT/none/p.csv"), "its folder does not exist"),
     (("--propose", "OUT/p.csv", "--least", "2"), "a number from 0 to 1"),
     (("--least", "0.3", "--learned", "OUT/none.npz"), "--propose"),

@@ -62,7 +62,7 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "home_7.txt").write_text("5 dive left high\n")
     status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
-    assert status == 2 and "no player could be made" in error[-1]
+    assert status == 2 and "no player could be synthesized" in error[-1]
     assert any("home_7" in line and "dive" in line for line in error)
     assert read_state(tmp_path / "out")["status"] == "failed"
 
@@ -121,7 +121,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     (tmp_path / "events").mkdir()
     apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
     status, _, error = match(events=apart, out=tmp_path / "new")
-    assert status == 2 and "no second file beside it for opta" in error[-1]
+    assert status == 2 and "the second file for opta is missing" in error[-1]
     named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
     status, _, error = match(events=apart, out=tmp_path / "new", **named)
     assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]
@@ -145,7 +145,7 @@ def test_an_option_is_taken_out_however_it_is_written(written):
     ({"meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-meta": "no.xml"}, 2, "no.xml"),
     ({"events": str(SMALL / "small_events.csv"), "events-provider": "x"}, 2, "--events-provider: 'x'; expected one of"),
-    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "no second file beside it for opta"),
+    ({"events": str(SMALL / "small_events.csv"), "events-provider": "opta"}, 2, "the second file for opta is missing"),
     ({"events-meta": "no.xml"}, 2, "--events-meta: no.xml, without --events"),
     ({"events-provider": "opta"}, 2, "--events-provider: opta, without --events"),
     ({"workers": 0}, 2, "'0' is not 1 to 256"),

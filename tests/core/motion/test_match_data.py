@@ -88,14 +88,14 @@ def test_parked_players_are_away():
     found, lines = mended_players(times, positions, 105.0, 68.0, [f"p{i}" for i in range(22)])
     assert np.isnan(found[0, times < 50]).all() and np.isnan(found[1, times > 160]).all()
     np.testing.assert_array_equal(found[2:], positions[2:])
-    assert lines[0] == "p0: 50 s beside the pitch, taken as away" and lines[1].startswith("p1: 50 s at one place")
+    assert lines[0] == "p0: 50 s beside the pitch, set to absent" and lines[1].startswith("p1: 50 s at exactly one position")
 
 
 # --- ends
 
 
 @pytest.mark.parametrize("signs, told", [
-    ((1.0, 1.0), None), ((-1.0, -1.0), "turned round"), ((-1.0, 1.0), "mirrored end to end"),
+    ((1.0, 1.0), None), ((-1.0, -1.0), "rotated by 180"), ((-1.0, 1.0), "mirrored end to end"),
     ((1.0, -1.0), "mirrored side to side"),
 ])
 def test_halves_are_turned_to_fit(signs, told):
@@ -125,7 +125,7 @@ def test_a_lineup_that_does_not_fit_the_sides_is_told():
     middle = positions[:, times < 100, 1].mean(axis=1) * np.where(np.array(teams) == "home", 1.0, -1.0)
     called = ["left back" if y > 8 else "right back" if y < -8 else "striker" for y in middle]
     assert side_lines(times, positions, PERIODS, teams, called) == []
-    assert "players called left" in side_lines(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
+    assert "left players are on the right" in side_lines(times, positions * [1.0, -1.0], PERIODS, teams, called)[0]
     assert side_lines(times, positions * [1.0, -1.0], PERIODS, teams, [""] * 22) == []
 
 
