@@ -116,8 +116,8 @@ class Now:
 
     Attributes:
         time: seconds on the track's clock.
-        frame: duration of one frame in seconds.
-        before: second at which the last moment or span before the playhead ends, None without one.
+        frame_duration: seconds of one frame.
+        previous_end: second at which the last moment or span before the playhead ends, None without one.
     """
 
     time: float

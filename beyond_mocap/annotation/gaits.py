@@ -177,7 +177,7 @@ def without_short_runs(gaits: np.ndarray, frames: int) -> np.ndarray:
 
     Args:
         gaits: (T,) int, gaits or directions.
-        frames: minimum length of a run.
+        min_length: minimum length of a run.
     Returns:
         (T,) int.
     """

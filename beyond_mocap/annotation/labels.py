@@ -115,7 +115,7 @@ def list_labels(**wanted: object) -> tuple[str, ...]:
     """List the labels with certain attributes.
 
     Args:
-        wanted: attribute of `Label` -> required value.
+        required: attribute of `Label` -> required value.
     Returns:
         Their names in the table's order.
     """

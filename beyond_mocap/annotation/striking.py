@@ -82,7 +82,7 @@ def faster_middle(found: Sequence[Surface], places: np.ndarray, rotations: np.nd
     """Trace the middle of the surface that moves farthest from the first frame to the last.
 
     Args:
-        found: the surfaces.
+        surfaces: the surfaces.
         positions: (T, J, 3) m, world frame.
         rotations: (T, J, 4) quaternions, world frame.
     Returns:
@@ -129,7 +129,7 @@ def smallest_gap(
     """Measure the smallest gap between the ball and some surfaces; see `measure_ball_gap`.
 
     Args:
-        found: the surfaces.
+        surfaces: the surfaces.
         positions: (..., J, 3) m, world frame.
         rotations: (..., J, 4) quaternions, world frame.
         ball: (..., 3) m, the ball's centre, world frame.

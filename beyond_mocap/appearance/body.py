@@ -96,8 +96,8 @@ def deformed(body: BodyMesh, skeleton: Skeleton, places: np.ndarray, world: np.n
     Args:
         body: the mesh, V vertices.
         skeleton: its skeleton, J joints.
-        places: (..., J, 3) m, the joints' positions, world frame.
-        world: (..., J, 4) quaternions, the joints' rotations, world frame.
+        positions: (..., J, 3) m, the joints' positions, world frame.
+        rotations: (..., J, 4) quaternions, the joints' rotations, world frame.
     Returns:
         (..., V, 3) m, world frame.
     """

@@ -53,10 +53,10 @@ def interpolate(
     """Interpolate values linearly at other times.
 
     Args:
-        at: (...), seconds or another clock.
+        sample_times: (...), seconds or another clock.
         times: (N,), ascending, on the same clock.
         values: (N, K), any unit.
-        outside: the value before the first time and after the last; None repeats the end values.
+        fill_value: the value before the first time and after the last; None repeats the end values.
     Returns:
         (..., K), that unit.
     """

@@ -210,7 +210,7 @@ def build_take(motion, clip: str, method: str, **known):
         motion: the motion, F frames.
         clip: name of the clip.
         method: how the motion came about, as reports name it.
-        known: fields of the take that differ from those of a plainly played clip.
+        fields: fields of the take that differ from those of a plainly played clip.
     Returns:
         A `Take`.
     """

@@ -254,7 +254,7 @@ def as_take(made):
     """Convert a reconstruction to a take, for the writers of takes (Blender's formats too).
 
     Args:
-        made: the reconstruction.
+        result: the reconstruction.
     Returns:
         A `Take`.
     """
@@ -271,7 +271,7 @@ def summary(made) -> str:
     """Describe a reconstruction in one line.
 
     Args:
-        made: the reconstruction.
+        result: the reconstruction.
     Returns:
         Frames, duration, markers and their mean distance.
     """
@@ -288,7 +288,7 @@ def add_to_library(made, name: str, options) -> list[str]:
     """Add the motion to a library as a clip; a throw's labels are placed at its release.
 
     Args:
-        made: the reconstruction.
+        result: the reconstruction.
         name: name of the clip.
         options: the parsed command line.
     Returns:

@@ -55,7 +55,7 @@ def fragment(*content: str, between: str = "") -> Html:
 
     Args:
         content: the parts in order.
-        between: separator.
+        separator: text between the parts.
     Returns:
         The joined HTML.
     """

@@ -37,7 +37,7 @@ class EventProvider(Provider):
 
     Attributes:
         arguments: kloppy's names for "events" (the file) and "meta" (the second file); empty if kloppy reads nothing.
-        second: pattern of the second file's beginning; empty if there is no second file.
+        second_pattern: pattern of the second file's beginning; empty if there is no second file.
         read_table: reads a CSV, which has no second file; None if kloppy reads all files.
         has_foot_side: whether the data has left and right feet; without them kloppy says "right" for both.
     """

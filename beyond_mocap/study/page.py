@@ -43,7 +43,7 @@ def study_report(found: Analysis) -> dict:
     """Build the analysis as plain values for JSON.
 
     Args:
-        found: the analysis.
+        analysis: the analysis.
     Returns:
         The report; None where a value is unknown.
     """
@@ -66,7 +66,7 @@ def study_page(found: Analysis) -> str:
     """Build the analysis as an HTML page.
 
     Args:
-        found: the analysis.
+        analysis: the analysis.
     Returns:
         The page as text.
     Raises:

@@ -110,7 +110,7 @@ class Setting:
         """Convert a user's value to the value that code reads.
 
         Args:
-            said: the value of the option or property.
+            user_value: the value of the option or property.
         Returns:
             The value; None where the user's value stands for "not set".
         """

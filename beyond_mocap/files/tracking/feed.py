@@ -140,7 +140,7 @@ def load_through_kloppy(path: Path, provider: str, loader: str, arguments: Mappi
         provider: kloppy's module.
         loader: kloppy's function.
         arguments: its arguments.
-        form: what the file should be, for errors.
+        expected: what the file should be, for errors.
         others: the files that belong to it, for errors.
     Returns:
         kloppy's dataset.

@@ -332,7 +332,7 @@ def side_lines(times, positions, periods, teams, called) -> list[str]:
         positions: (P, N, 2) m, repaired.
         periods: (start, end) s, in order.
         teams: P of "home", "away", "referee".
-        called: P positions in words.
+        position_names: P positions in words.
     Returns:
         A warning if they are exchanged.
     """

@@ -88,7 +88,8 @@ def test_parked_players_are_away():
     found, lines = mended_players(times, positions, 105.0, 68.0, [f"p{i}" for i in range(22)])
     assert np.isnan(found[0, times < 50]).all() and np.isnan(found[1, times > 160]).all()
     np.testing.assert_array_equal(found[2:], positions[2:])
-    assert lines[0] == "p0: 50 s beside the pitch, set to absent" and lines[1].startswith("p1: 50 s at exactly one position")
+    assert lines[0] == "p0: 50 s beside the pitch, set to absent"
+    assert lines[1].startswith("p1: 50 s at exactly one position")
 
 
 # --- ends
@@ -219,8 +220,8 @@ def test_a_team_s_file_that_ends_before_the_other_s_is_told(tmp_path):
         (tmp_path / f"g_{team}.csv").write_text("\n".join(rows) + "\n")
     match = read_match(tmp_path / "g_Home.csv", cache_dir=tmp_path)
     assert len(match.times) == 39
-    told = "the teams' files have not as many rows (g_Home.csv 62 and g_Away.csv 42): only what both have is read"
-    assert told in match.report
+    told = "the teams' files differ in their number of rows (g_Home.csv 62 and g_Away.csv 42)"
+    assert any(line.startswith(told) for line in match.report)
 
 
 @pytest.mark.parametrize("said, expected", [
