@@ -36,7 +36,7 @@ def model(folder):
 def test_words_are_proposed_for_the_clips_without(folder, model, tmp_path, capsys):
     out = tmp_path / "proposed.csv"
     assert main(["library", str(folder), "--propose", str(out), "--learned", str(model)]) == 0
-    assert "for 2 clips without words" in capsys.readouterr().out
+    assert "for 2 clips without labels" in capsys.readouterr().out
     rows = read_annotation_csv(out)
     assert set(rows) == {"new/one.bvh", "new/two.bvh"}
     (kick,) = [row for row in rows["new/one.bvh"] if row.key is not None]

@@ -140,7 +140,7 @@ def first(header) -> dict:
     (lambda h: first(h)["placed"][0].__setitem__(1, 9), "clip 9"),
     (lambda h: first(h)["touches"].pop(0), "rows"),
     (lambda h: first(h)["touches"][0].__setitem__(1, "yes"), "true or false"),
-    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "as a word"),
+    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "is not a label"),
     (lambda h: first(h)["pins"][0].update(part="nose"), "nose"),
 ])
 def test_a_wrong_text_is_told(tmp_path, whole, change, told):

@@ -189,7 +189,7 @@ def test_a_half_that_is_missing_is_told(tmp_path):
 
 
 def test_metadata_of_another_match_is_refused(tmp_path):
-    with pytest.raises(InputError, match="within the halves that g_meta.xml names"):
+    with pytest.raises(InputError, match="within the periods in g_meta.xml"):
         read_match(tracab(tmp_path, start=100000, end=200000), cache_dir=tmp_path)
     with pytest.raises(InputError, match=r"16 of 22 tracked players .* are not in g_meta.xml; .* one match"):
         read_match(tracab(tmp_path, named=range(9, 20)), cache_dir=tmp_path)
@@ -208,7 +208,7 @@ def test_two_teams_of_two_matches_are_refused(tmp_path):
         rows = [f",,,{team},,,", ",,,7,,,", "Period,Frame,Time [s],Player7,,Ball,"]
         rows += [f"1,{n},{n / 25:.2f},0.5,0.5,{ball},0.25" for n in range(1, 30)]
         (tmp_path / f"g_{team}.csv").write_text("\n".join(rows) + "\n")
-    with pytest.raises(InputError, match="another ball in 29 of 29 rows than in g_Away.csv"):
+    with pytest.raises(InputError, match="the ball differs in 29 of 29 rows from g_Away.csv"):
         read_match(tmp_path / "g_Home.csv", cache_dir=tmp_path)
 
 
