@@ -60,7 +60,7 @@ def test_words_are_proposed_saved_and_used_by_the_library(core, rooms, library):
     listing = bpy.context.window_manager.beyond_mocap_clips
     assert next(clip for clip in listing.shown if clip.name == "kick_low_top").words.startswith("kick right")
     bpy.ops.beyond_mocap.build_library()
-    assert "kick: 1 moment" in bpy.context.scene.beyond_mocap.library_holds
+    assert "Kick: 1 moment" in bpy.context.scene.beyond_mocap.library_holds
 
 
 def test_a_strip_that_is_moved_says_so_when_saved(core, rooms, library):

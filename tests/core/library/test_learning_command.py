@@ -36,7 +36,7 @@ def model(folder):
 def test_words_are_proposed_for_the_clips_without(folder, model, tmp_path, capsys):
     out = tmp_path / "proposed.csv"
     assert main(["library", str(folder), "--propose", str(out), "--learned", str(model)]) == 0
-    assert "for 2 clips without words" in capsys.readouterr().out
+    assert "for 2 clips without labels" in capsys.readouterr().out
     rows = read_annotation_csv(out)
     assert set(rows) == {"new/one.bvh", "new/two.bvh"}
     (kick,) = [row for row in rows["new/one.bvh"] if row.key is not None]
@@ -93,7 +93,7 @@ def test_rules_alone_where_nothing_was_learned(folder, tmp_path):
 
 @pytest.mark.parametrize("options, told", [
     (("--propose", "OUT/p.csv", "--learned", "OUT/none.npz"), "no such file"),
-    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "given beside --learn"),
+    (("--learn", "OUT/m.npz", "--learned", "OUT/none.npz"), "set with --learn"),
     (("--propose", "OUT/none/p.csv"), "its folder does not exist"),
     (("--propose", "OUT/p.csv", "--least", "2"), "a number from 0 to 1"),
     (("--least", "0.3", "--learned", "OUT/none.npz"), "--propose"),

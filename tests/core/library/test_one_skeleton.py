@@ -80,7 +80,7 @@ def test_the_command_writes_the_targets_names_at_the_inputs_rate(walk, other, tm
     out = tmp_path / "out.bvh"
     assert main(["retarget", str(tmp_path / "in.bvh"), "--to", str(tmp_path / "to.bvh"), "--out", str(out)]) == 0
     told = capsys.readouterr()
-    assert str(out) in told.out and "unit 0.01 m (guessed)" in told.err
+    assert str(out) in told.out and "unit 0.01 m (estimated)" in told.err
     wrote, target = bvh.read(out), bvh.read(tmp_path / "to.bvh")
     assert wrote.motion.skeleton.names == target.motion.skeleton.names
     assert wrote.form.channels == target.form.channels

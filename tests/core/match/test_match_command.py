@@ -43,7 +43,7 @@ def test_a_player_and_the_ball(match, tmp_path):
     told = [json.loads(line) for line in error]
     shares = [line["progress"] for line in told if "progress" in line]
     assert status == 0 and "1 of 1 players, 2.0 s" in out and shares == sorted(shares) and shares[-1] > 0.9
-    assert any("small_meta.xml taken" in line.get("note", "") for line in told)
+    assert any("small_meta.xml is used" in line.get("note", "") for line in told)
     files = sorted(path.name for path in (tmp_path / "out").iterdir())
     assert files == [".work", "annotations", "ball.csv", "home_7.take.npz", "match.json"]
     assert read_state(tmp_path / "out")["status"] == "done"
@@ -62,7 +62,7 @@ def test_a_player_whose_words_the_library_lacks_fails_where_that_is_asked(match,
     (tmp_path / "words").mkdir()
     (tmp_path / "words" / "home_7.txt").write_text("5 dive left high\n")
     status, _, error = match("--exact", "--no-figures", annotations=tmp_path / "words")
-    assert status == 2 and "no player could be made" in error[-1]
+    assert status == 2 and "no player could be synthesized" in error[-1]
     assert any("home_7" in line and "dive" in line for line in error)
     assert read_state(tmp_path / "out")["status"] == "failed"
 
@@ -113,7 +113,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     """One that needs no second file says so; two files that lie apart are read, and are of another match."""
     named = {"events": SMALL / "small_events.csv", "events-meta": SMALL / "small_meta.xml", "events-provider": "csv"}
     status, _, error = match("--no-figures", **named)
-    assert status == 0 and any("small_meta.xml: not used, since events of csv are in one file" in one for one in error)
+    assert status == 0 and any("small_meta.xml: not used, because events of csv are in one file" in one for one in error)
     kloppy = pytest.importorskip("kloppy")
     folder = Path(kloppy.__file__).parent / "tests" / "files"
     if not (folder / "opta_f24.xml").is_file():
@@ -121,7 +121,7 @@ def test_the_events_second_file_and_provider_may_be_named(match, tmp_path):
     (tmp_path / "events").mkdir()
     apart = shutil.copy(folder / "opta_f24.xml", tmp_path / "events" / "monday.xml")
     status, _, error = match(events=apart, out=tmp_path / "new")
-    assert status == 2 and "no second file beside it for opta" in error[-1]
+    assert status == 2 and "the second file for opta is missing" in error[-1]
     named = {"events-meta": folder / "opta_f7.xml", "events-provider": "OPTA"}
     status, _, error = match(events=apart, out=tmp_path / "new", **named)
     assert status == 2 and "players" in error[-1] and "are not in the tracking" in error[-1]

@@ -162,7 +162,7 @@ def test_seconds_that_no_match_has_do_not_stop_the_page(tmp_path, changed):
 
 @pytest.mark.parametrize("changed, told", [
     ({"warnings": 5}, "its warnings are no list"), ({"warnings": None}, "its warnings are no list"),
-    ({"skate": json.loads('{"a":' * 900 + "1" + "}" * 900)}, "nested more than 30 deep"),
+    ({"skate": json.loads('{"a":' * 900 + "1" + "}" * 900)}, "nested more than 30 levels deep"),
     ({"root_error_m": {"mean": 10**400}}, ""), ({"per_second": {"start_s": 1e300, "root_error_m": [1.0]}}, ""),
 ])
 def test_odd_values_of_one_player_touch_nobody_else(tmp_path, changed, told):

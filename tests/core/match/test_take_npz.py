@@ -140,7 +140,7 @@ def first(header) -> dict:
     (lambda h: first(h)["placed"][0].__setitem__(1, 9), "clip 9"),
     (lambda h: first(h)["touches"].pop(0), "rows"),
     (lambda h: first(h)["touches"][0].__setitem__(1, "yes"), "true or false"),
-    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "as a word"),
+    (lambda h: first(h)["keys"][0].__setitem__(1, ["a b"]), "is not a label"),
     (lambda h: first(h)["pins"][0].update(part="nose"), "nose"),
 ])
 def test_a_wrong_text_is_told(tmp_path, whole, change, told):
@@ -182,7 +182,7 @@ def test_what_is_no_such_file_is_told(tmp_path, data, told):
 
 def test_a_file_cut_short_is_told(tmp_path, whole):
     (tmp_path / "x.npz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match="damaged, cut short"):
+    with pytest.raises(InputError, match="damaged, truncated"):
         read_player(tmp_path / "x.npz")
 
 

@@ -102,7 +102,7 @@ def test_a_value_that_is_too_deep_to_be_shown_is_told():
     deep = []
     for _ in range(100000):
         deep = [deep]
-    with pytest.raises(InputError, match="player 1: a value nested too deep; expected a number"):
+    with pytest.raises(InputError, match="player 1: a value nested too deeply; expected a number"):
         number(deep, "player 1")
 
 
@@ -110,7 +110,7 @@ def test_files_that_are_none(tmp_path):
     (tmp_path / "a").write_bytes(b"\xff\xfe")
     (tmp_path / "b").write_text("[" * 100000)
     (tmp_path / "c").write_text('{"version": 1,\n "joints"')
-    for name, said in (("missing", "no such file"), (".", "a folder"), ("a", "no text"), ("b", "b"), ("c", "c:2:10")):
+    for name, said in (("missing", "no such file"), (".", "a folder"), ("a", "not UTF-8"), ("b", "b"), ("c", "c:2:10")):
         with pytest.raises(InputError, match=said) as told:
             read_model(tmp_path / name)
         assert "\n" not in str(told.value)
