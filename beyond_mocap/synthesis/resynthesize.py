@@ -89,7 +89,7 @@ def resynthesize(
         variant: a stretch of which another solution is requested, whether or not its plan has changed.
     Raises:
         InputError: where that stretch lies outside the take, or for another method than "path".
-        NotInLibraryError, CancelledError: as for `synthesize`.
+        NotInLibraryError, UserCancelledError: as for `synthesize`.
     """
     from threadpoolctl import threadpool_limits
 

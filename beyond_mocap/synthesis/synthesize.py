@@ -107,7 +107,7 @@ def synthesize(
     Raises:
         NotInLibraryError: for a key moment that no clip can serve (unless plan.nearest).
         InputError: for an unknown method.
-        CancelledError: when `cancelled` returns true.
+        UserCancelledError: when `cancelled` returns true.
     """
     if plan.method not in METHODS:
         raise InputError("method", plan.method, f"one of {', '.join(METHODS)}")
